@@ -1,1 +1,44 @@
-//! crumple
+//! A compact spectral descriptor for shape deformations.
+//!
+//! The method of Sible, Iza-Teran, Garcke, Aulig and Wollstadt, one module a stage, in the order in which data
+//! flows. Every stage has one main function whose arguments and result are plain data; nothing flows back.
+//!
+//! | stage | module | from | to |
+//! | --- | --- | --- | --- |
+//! | find and open result files | [`bundle`], [`run`] | paths | [`run::Run`] |
+//! | input tables | [`inputs`] | CSV | a row a run |
+//! | the surface all runs share | [`reference`] | a run, parts | [`reference::Reference`] |
+//! | eigenbasis | [`basis`] | the reference | [`basis::Basis`] |
+//! | what is kept on disk | [`study`] | all of it | [`study::Study`] |
+//! | coefficients of every state | [`project`] | a run | [`project::Projected`] |
+//! | deformation modes | [`modes`] | coefficients | [`modes::Modes`] |
+//! | the coefficients that matter | [`descriptor`] | one state | [`descriptor::Descriptor`] |
+//! | shape from coefficients | [`reconstruct`] | a descriptor | errors in mm |
+//! | how alike | [`similarity`] | a descriptor, coefficients | a ranking |
+//! | other methods on the same data | [`rivals`] | displacements | PCA, first M |
+//! | judged against labels | [`compare`] | labels | precision, average precision |
+//! | tables and arrays for others | [`export`] | a study | npy, CSV, Parquet |
+//! | one page for a person | [`report`] | a study | HTML |
+//!
+//! Libraries print nothing: progress and cancellation come in as a [`Watch`], warnings go out as values.
+
+pub mod basis;
+pub mod bundle;
+pub mod compare;
+pub mod descriptor;
+mod error;
+pub mod export;
+pub mod inputs;
+pub mod modes;
+pub mod project;
+pub mod reconstruct;
+pub mod reference;
+pub mod report;
+pub mod rivals;
+pub mod run;
+pub mod similarity;
+pub mod study;
+pub mod target;
+
+pub use error::Error;
+pub use mesh_spectrum::Watch;

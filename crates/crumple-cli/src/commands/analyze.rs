@@ -1,0 +1,174 @@
+//! `crumple analyze`: the whole way in one command.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::Args;
+use crumple::bundle::{self, Found};
+use crumple::descriptor::{self, Descriptor};
+use crumple::modes;
+use crumple::run::Run;
+use crumple::study::{AddOptions, Loaded, Study};
+use crumple::target::Named;
+use crumple::{Error, Watch};
+use serde_json::json;
+
+use super::{Answer, add, describe, init, report};
+use crate::options::{AddArgs, BasisArgs, DescribeArgs, ModesArgs};
+use crate::output::{Output, percent, table};
+
+#[derive(Args)]
+#[command(
+    after_help = "Repeating it on the same study adds what is new and finds modes, descriptors and report again.\n\nExample, in the repository:\n  crumple analyze examples/hat-section/runs --params examples/hat-section/inputs.csv --join 2.5 -o study"
+)]
+pub(crate) struct Analyze {
+    /// Root files, run folders, or folders with runs below them
+    #[arg(required = true, value_name = "RUN")]
+    runs: Vec<PathBuf>,
+    /// Folder of the study; the page is written into it as report.html
+    #[arg(short, long, value_name = "STUDY")]
+    output: PathBuf,
+    /// Run whose undeformed shells are the surface, by id or path [default: the first by name]
+    #[arg(long, value_name = "RUN")]
+    reference: Option<String>,
+    #[command(flatten)]
+    basis: BasisArgs,
+    #[command(flatten)]
+    add: AddArgs,
+    #[command(flatten)]
+    modes: ModesArgs,
+    #[command(flatten)]
+    describe: DescribeArgs,
+}
+
+impl Analyze {
+    pub(crate) fn run(&self, output: &Output, watch: &dyn Watch) -> Result<Answer, Error> {
+        let (modes_options, describe_options) = (self.modes.options()?, self.describe.options()?);
+        let table = self.add.table()?;
+        let mut seconds = Stopwatch::start();
+        let found = bundle::find(&self.runs)?;
+        let reference = self.reference_run(&found)?;
+        seconds.lap("find");
+        let mut study = self.open_or_create(&reference, watch)?;
+        seconds.lap("init");
+        let options = AddOptions { replace: self.add.replace, skip_bad: self.add.skip_bad, params: table.as_ref() };
+        let added = study.add(&found, options, watch)?;
+        seconds.lap("add");
+        let modes = modes::modes(&study, &modes_options, watch)?;
+        modes::save(&study, &modes)?;
+        seconds.lap("modes");
+        let loaded = Loaded::of(study)?;
+        let mut descriptors = Vec::new();
+        for mode in &modes.modes {
+            let named = Named { run: mode.medoid.clone(), state: None };
+            let described = descriptor::describe(&loaded, &named, Some(&mode.name), &mode.name, &describe_options)?;
+            descriptor::save(&loaded.study, &described.descriptor)?;
+            descriptors.push(described.descriptor);
+        }
+        seconds.lap("describe");
+        let path = self.output.join("report.html");
+        report::write(&loaded, &describe_options, &path, watch)?;
+        seconds.lap("report");
+        init::advise(&loaded.basis, output);
+        add::tell(&loaded.study, &added, output);
+        let facts = json!({
+            "study": self.output,
+            "report": path,
+            "init": init::facts(&loaded),
+            "add": add::facts(&loaded.study, &added),
+            "modes": super::modes::facts(&modes),
+            "descriptors": descriptors.iter().map(describe::facts).collect::<Vec<_>>(),
+            "seconds": seconds.laps,
+        });
+        output.print(&facts, || {
+            let unit = &loaded.study.settings().length_unit;
+            format!(
+                "{}\n\n{}\n\nreport: {}",
+                super::modes::words(&modes, unit),
+                descriptor_words(&descriptors, unit),
+                path.display()
+            )
+        });
+        Ok(Answer::Done)
+    }
+
+    fn reference_run(&self, found: &[Found]) -> Result<Run, Error> {
+        let Some(name) = &self.reference else {
+            // The first that can be read: a bundle whose first run failed is no reason to stop.
+            let usable = |found: &&Found| found.fault.is_none();
+            let mut first_error = None;
+            for run in found.iter().filter(usable) {
+                match Run::open(&run.id, &run.path) {
+                    Ok(run) => return Ok(run),
+                    Err(error) if self.add.skip_bad => first_error = first_error.or(Some(error)),
+                    Err(error) => return Err(error),
+                }
+            }
+            let why = found.first().and_then(|run| run.fault.clone()).unwrap_or_else(|| "no run".into());
+            return Err(first_error.unwrap_or(Error::BadRuns {
+                failures: vec![(found.first().map(|run| run.id.clone()).unwrap_or_default(), why)],
+                total: found.len(),
+            }));
+        };
+        if let Some(run) = found.iter().find(|run| run.id == *name) {
+            return Run::open(&run.id, &run.path);
+        }
+        match &bundle::find(&[PathBuf::from(name)])?[..] {
+            [only] => Run::open(&only.id, &only.path),
+            several => Err(Error::Value {
+                name: "--reference",
+                value: name.clone(),
+                expected: format!("one run; this folder holds {}", several.len()),
+            }),
+        }
+    }
+
+    fn open_or_create(&self, reference: &Run, watch: &dyn Watch) -> Result<Study, Error> {
+        let options = self.basis.options();
+        match Study::create(&self.output, reference, &self.basis.parts, &options, watch) {
+            Err(Error::StudyExists { folder, .. }) => {
+                let study = Study::open(&folder)?;
+                if study.is_for(reference, &self.basis.parts, &options)? {
+                    return Ok(study);
+                }
+                let what = "the study here has another mesh, other parts, another join or another number of eigenpairs"
+                    .to_owned();
+                Err(Error::StudyExists { folder, what })
+            }
+            other => other,
+        }
+    }
+}
+
+fn descriptor_words(descriptors: &[Descriptor], unit: &str) -> String {
+    let rows = descriptors.iter().map(|descriptor| {
+        let errors = &descriptor.errors;
+        vec![
+            descriptor.name.clone(),
+            descriptor.run.clone(),
+            descriptor.eigenvectors.len().to_string(),
+            (3 * descriptor.eigenvectors.len()).to_string(),
+            format!("{:.2}", errors.rms),
+            percent(errors.relative),
+        ]
+    });
+    table(&["descriptor", "of", "#eigenvectors", "#numbers", &format!("#RMS error, {unit}"), "#of displacement"], rows)
+}
+
+/// Seconds a stage, in order.
+struct Stopwatch {
+    last: Instant,
+    laps: serde_json::Map<String, serde_json::Value>,
+}
+
+impl Stopwatch {
+    fn start() -> Self {
+        Self { last: Instant::now(), laps: serde_json::Map::new() }
+    }
+
+    fn lap(&mut self, stage: &str) {
+        let now = Instant::now();
+        self.laps.insert(stage.to_owned(), json!((now - self.last).as_secs_f64()));
+        self.last = now;
+    }
+}

@@ -1,0 +1,83 @@
+//! One file a command.
+
+mod add;
+mod analyze;
+mod check;
+mod compare;
+mod describe;
+mod distance;
+mod export;
+mod info;
+mod init;
+mod modes;
+mod reconstruct;
+mod report;
+mod search;
+mod verify;
+
+use clap::Subcommand;
+use crumple::{Error, Watch};
+
+use crate::output::Output;
+
+/// What a command has to say besides what it printed.
+pub(crate) enum Answer {
+    /// It is done.
+    Done,
+    /// The answer is "no".
+    No,
+}
+
+/// The commands, in the order in which they are used.
+#[derive(Subcommand)]
+pub(crate) enum Command {
+    /// All of it: find the runs, make the study, find the modes, describe them, write the report
+    Analyze(analyze::Analyze),
+    /// What a result file holds: format, parts, states, fields, problems
+    Info(info::Info),
+    /// Make a study: the reference mesh and its eigenbasis
+    Init(init::Init),
+    /// Add runs to a study: project every state of theirs
+    Add(add::Add),
+    /// Find the deformation modes of a study
+    Modes(modes::Modes),
+    /// Build and save the descriptor of a run or of a mode
+    Describe(describe::Describe),
+    /// Find the runs that deform like a descriptor says
+    Search(search::Search),
+    /// Does each run deform as the descriptor says? Exit code 1 if one does not
+    Verify(verify::Verify),
+    /// One number for an optimiser: how far a run is from a descriptor
+    Distance(distance::Distance),
+    /// The shape from a descriptor, from the first M eigenvectors or from principal components, as a file
+    Reconstruct(reconstruct::Reconstruct),
+    /// Arrays and tables for other tools
+    Export(export::Export),
+    /// The descriptor against its rivals: size, errors, and, given labels, quality of the ranking
+    Compare(compare::Compare),
+    /// One self-contained page for a person
+    Report(report::Report),
+    /// Is the study whole? Exit code 1 if not
+    Check(check::Check),
+}
+
+impl Command {
+    pub(crate) fn run(&self, output: &Output, watch: &dyn Watch) -> Result<Answer, Error> {
+        match self {
+            Self::Analyze(command) => command.run(output, watch),
+            Self::Info(command) => command.run(output),
+            Self::Init(command) => command.run(output, watch),
+            Self::Add(command) => command.run(output, watch),
+            Self::Modes(command) => command.run(output, watch),
+            Self::Describe(command) => command.run(output),
+            Self::Search(command) => command.run(output),
+            Self::Verify(command) => command.run(output),
+            Self::Distance(command) => command.run(output),
+            Self::Reconstruct(command) => command.run(output),
+            Self::Export(command) => command.run(output),
+            Self::Compare(command) => command.run(output),
+            Self::Report(command) => command.run(output, watch),
+            Self::Check(command) => command.run(output),
+        }
+    }
+}

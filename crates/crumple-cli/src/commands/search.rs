@@ -1,0 +1,56 @@
+//! `crumple search`: the most similar runs and states.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use crumple::Error;
+use crumple::descriptor;
+use crumple::similarity;
+use crumple::study::{Loaded, Rows};
+use serde_json::json;
+
+use super::Answer;
+use crate::options::{SimilarityArgs, rows};
+use crate::output::{Output, table};
+
+#[derive(Args)]
+#[command(after_help = "Example:\n  crumple search study mode-1 --top 9")]
+pub(crate) struct Search {
+    /// Folder of the study
+    study: PathBuf,
+    /// Name of a descriptor of the study, or the path of its file
+    descriptor: String,
+    /// How many results, best first
+    #[arg(long, value_name = "N", default_value_t = 20)]
+    top: usize,
+    /// Which states: the `last` one of each run, or `all` [default: last]
+    #[arg(long, value_name = "WHICH")]
+    states: Option<String>,
+    #[command(flatten)]
+    similarity: SimilarityArgs,
+}
+
+impl Search {
+    pub(crate) fn run(&self, output: &Output) -> Result<Answer, Error> {
+        let (options, rows) = (self.similarity.options()?, rows(self.states.as_deref())?);
+        let loaded = Loaded::open(&self.study)?;
+        let descriptor = descriptor::load(&loaded.study, &self.descriptor)?;
+        let mut hits = similarity::search(&loaded, &descriptor, options, rows)?;
+        let searched = hits.len();
+        hits.truncate(self.top);
+        output.print(&json!({ "descriptor": descriptor.name, "searched": searched, "results": hits }), || {
+            let cells = hits.iter().zip(1..).map(|(hit, rank)| {
+                vec![
+                    rank.to_string(),
+                    hit.run.clone(),
+                    hit.state.to_string(),
+                    hit.time.to_string(),
+                    format!("{:.4}", hit.score.similarity),
+                ]
+            });
+            let what = if rows == Rows::Last { "runs" } else { "states" };
+            format!("{}\n{searched} {what} searched", table(&["#", "run", "#state", "#time", "#similarity"], cells))
+        });
+        Ok(Answer::Done)
+    }
+}

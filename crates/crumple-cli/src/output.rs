@@ -1,0 +1,75 @@
+//! What is printed: results to standard output, as a table or as JSON; words to standard error.
+
+use std::io::Write;
+
+use comfy_table::{CellAlignment, LineStyle, Table, TableStyle};
+
+/// How to print.
+pub(crate) struct Output {
+    pub(crate) json: bool,
+    pub(crate) quiet: bool,
+}
+
+impl Output {
+    /// Prints JSON where that was asked for, else what `words` makes.
+    pub(crate) fn print(&self, json: &serde_json::Value, words: impl FnOnce() -> String) {
+        let text = if self.json { serde_json::to_string_pretty(json).unwrap_or_default() } else { words() };
+        let mut out = std::io::stdout().lock();
+        // A reader that has seen enough (`head`) is no failure of ours.
+        let _ = out.write_all(text.trim_end().as_bytes()).and_then(|()| out.write_all(b"\n"));
+    }
+
+    /// A word to the person; not in the way of a script.
+    pub(crate) fn note(&self, text: &str) {
+        if !self.quiet {
+            let _ = writeln!(std::io::stderr(), "note: {text}");
+        }
+    }
+}
+
+/// A line under the header and one at the end: a table that can be pasted into a mail.
+const STYLE: TableStyle = TableStyle::new()
+    .header_separator(LineStyle::new('─', '─', '─', '─'))
+    .bottom_border(LineStyle::new('─', '─', '─', '─'));
+
+/// A table: names of columns, and rows of cells. Columns whose name starts with `#` are numbers, set to the right.
+pub(crate) fn table(names: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
+    let mut table = Table::new();
+    table.load_style(STYLE);
+    table.set_header(names.iter().map(|name| name.trim_start_matches('#')));
+    for row in rows {
+        table.add_row(row);
+    }
+    for (index, _) in names.iter().enumerate().filter(|(_, name)| name.starts_with('#')) {
+        if let Some(column) = table.column_mut(index) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    table.lines().map(|line| line.trim_end().to_owned()).collect::<Vec<_>>().join("\n")
+}
+
+/// What is wrong, and what to do.
+pub(crate) fn print_error(error: &crumple::Error) {
+    let mut err = std::io::stderr().lock();
+    let _ = writeln!(err, "error: {error}");
+    if let Some(remedy) = error.remedy() {
+        let _ = writeln!(err, "hint: {remedy}");
+    }
+}
+
+/// Names in a line, the first few of many.
+pub(crate) fn some<'a>(names: impl ExactSizeIterator<Item = &'a str>, most: usize) -> String {
+    let count = names.len();
+    let shown: Vec<&str> = names.take(most).collect();
+    if count > most { format!("{} … ({count} in all)", shown.join(" ")) } else { shown.join(" ") }
+}
+
+/// A fraction as a percentage.
+pub(crate) fn percent(fraction: Option<f64>) -> String {
+    fraction.map_or_else(|| "–".into(), |fraction| format!("{:.1} %", 100.0 * fraction))
+}
+
+/// A judgement with two decimals, or a dash.
+pub(crate) fn two(value: Option<f64>) -> String {
+    value.map_or_else(|| "–".into(), |value| format!("{value:.2}"))
+}

@@ -1,0 +1,80 @@
+//! Descriptors on disk: `descriptors/NAME.json` in a study, or any file that was copied from there.
+
+use std::path::{Path, PathBuf};
+
+use super::Descriptor;
+use crate::Error;
+use crate::error::io;
+use crate::study::{DESCRIPTORS, Study, store};
+
+/// Saves a descriptor in its study; one of the same name is replaced.
+///
+/// # Errors
+/// [`Error::Value`] for a name that is no file name, [`Error::Io`].
+pub fn save(study: &Study, descriptor: &Descriptor) -> Result<PathBuf, Error> {
+    let name = &descriptor.name;
+    if name.is_empty() || name.starts_with('.') || name.contains(['/', '\\', '\0']) {
+        return Err(Error::Value {
+            name: "--name",
+            value: name.clone(),
+            expected: "a name that can be a file name".into(),
+        });
+    }
+    let folder = study.folder().join(DESCRIPTORS);
+    std::fs::create_dir_all(&folder).map_err(io("make the folder", &folder))?;
+    let path = folder.join(format!("{name}.json"));
+    let text = serde_json::to_string_pretty(descriptor).map_err(|error| Error::Internal(error.to_string()))?;
+    store::write_bytes(&path, text.as_bytes())?;
+    Ok(path)
+}
+
+/// Loads a descriptor by its name in the study, or by the path of its file.
+///
+/// # Errors
+/// [`Error::UnknownDescriptor`], [`Error::Damaged`], [`Error::OtherBasis`].
+pub fn load(study: &Study, name: &str) -> Result<Descriptor, Error> {
+    let inside = study.folder().join(DESCRIPTORS).join(format!("{name}.json"));
+    let path = if inside.is_file() { inside } else { PathBuf::from(name) };
+    if !path.is_file() {
+        let names = list(study)?;
+        let available = if names.is_empty() { "none yet".to_owned() } else { names.join(", ") };
+        return Err(Error::UnknownDescriptor { asked: name.to_owned(), available });
+    }
+    read(&path, study)
+}
+
+fn read(path: &Path, study: &Study) -> Result<Descriptor, Error> {
+    let text = std::fs::read_to_string(path).map_err(io("read", path))?;
+    let damaged = |what: String| Error::Damaged { path: path.to_owned(), what };
+    let descriptor: Descriptor =
+        serde_json::from_str(&text).map_err(|error| damaged(format!("not a descriptor: {error}")))?;
+    let expected = &study.manifest().basis;
+    if descriptor.basis != *expected {
+        return Err(Error::OtherBasis { name: descriptor.name, found: descriptor.basis, expected: expected.clone() });
+    }
+    if descriptor.eigenvectors.len() != descriptor.values.len()
+        || descriptor.eigenvectors.is_empty()
+        || descriptor.eigenvectors.contains(&0)
+    {
+        return Err(damaged("its eigenvectors and values do not fit together".into()));
+    }
+    Ok(descriptor)
+}
+
+/// Names of the study's descriptors, sorted.
+///
+/// # Errors
+/// [`Error::Io`].
+pub fn list(study: &Study) -> Result<Vec<String>, Error> {
+    let folder = study.folder().join(DESCRIPTORS);
+    if !folder.exists() {
+        return Ok(Vec::new());
+    }
+    let entries = std::fs::read_dir(&folder).map_err(io("read the folder", &folder))?;
+    let name = |entry: std::fs::DirEntry| {
+        entry.file_name().to_str()?.strip_suffix(".json").filter(|name| !name.starts_with('.')).map(str::to_owned)
+    };
+    let mut names: Vec<String> = entries.flatten().filter_map(name).collect();
+    names.sort();
+    Ok(names)
+}

@@ -1,0 +1,206 @@
+//! The threshold t: which coefficients are large enough to be kept.
+//!
+//! A magnitude is compared with t, as the paper's text says (its equation is printed without bars); an eigenvector is
+//! kept as soon as one of its three components passes, and then with all three (the paper's completed triples).
+
+use std::fmt;
+use std::str::FromStr;
+
+use crate::Error;
+
+/// How t is found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Threshold {
+    /// t = mean + C standard deviations over all 3K magnitudes. The paper's is `std:1`.
+    Std(f64),
+    /// t = C × mean over all 3K magnitudes.
+    Mean(f64),
+    /// t itself, in length².
+    Value(f64),
+    /// The M eigenvectors with the largest magnitude.
+    Top(usize),
+    /// The fewest eigenvectors, by magnitude, that hold this share of Σ over all K of the squared coefficients.
+    Energy(f64),
+    /// The fewest eigenvectors, by magnitude, whose reconstruction has at most this M-weighted RMS error, in the
+    /// length unit: the paper's loop that adjusts t.
+    Error(f64),
+}
+
+/// What a threshold selects.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Selection {
+    /// Eigenvectors kept, counted from 1, rising.
+    pub eigenvectors: Vec<usize>,
+    /// t, in length². For `top`, `energy` and `error` the smallest magnitude that is kept.
+    pub threshold: f64,
+}
+
+impl Default for Threshold {
+    /// The paper's: one standard deviation above the mean.
+    fn default() -> Self {
+        Self::Std(1.0)
+    }
+}
+
+impl Threshold {
+    /// Applies the rule to the coefficients of one state, K × 3.
+    ///
+    /// `rms_without(order, m)` must give the RMS error of a reconstruction from the first m eigenvectors of `order`;
+    /// it is asked only by [`Threshold::Error`].
+    ///
+    /// # Errors
+    /// [`Error::Threshold`] if nothing passes, or the wanted error cannot be reached with K eigenvectors.
+    pub fn select(
+        &self,
+        values: &[[f64; 3]],
+        rms_without: impl Fn(&[usize], usize) -> f64,
+    ) -> Result<Selection, Error> {
+        let largest: Vec<f64> =
+            values.iter().map(|triple| triple.iter().fold(0.0, |most: f64, x| most.max(x.abs()))).collect();
+        let fail = |what: String| Error::Threshold { rule: self.to_string(), what };
+        let count = (3 * values.len()) as f64;
+        let magnitudes = || values.iter().flatten().map(|x| x.abs());
+        let mean = magnitudes().sum::<f64>() / count;
+        let above = |t: f64| {
+            let eigenvectors: Vec<usize> = (1..=values.len()).filter(|&j| largest[j - 1] > t).collect();
+            let most = largest.iter().copied().fold(0.0, f64::max);
+            if eigenvectors.is_empty() {
+                Err(fail(format!("no coefficient is larger than t = {t:.6}; the largest is {most:.6}")))
+            } else {
+                Ok(Selection { eigenvectors, threshold: t })
+            }
+        };
+        // By falling magnitude, ties by number: lowering t walks along this order.
+        let mut order: Vec<usize> = (1..=values.len()).collect();
+        order.sort_by(|&a, &b| largest[b - 1].total_cmp(&largest[a - 1]).then(a.cmp(&b)));
+        let first = |m: usize| {
+            let mut eigenvectors = order[..m].to_vec();
+            eigenvectors.sort_unstable();
+            Selection { eigenvectors, threshold: largest[order[m - 1] - 1] }
+        };
+        match *self {
+            Self::Std(c) => {
+                let variance = magnitudes().map(|x| (x - mean).powi(2)).sum::<f64>() / count;
+                above(mean + c * variance.sqrt())
+            }
+            Self::Mean(c) => above(c * mean),
+            Self::Value(t) => above(t),
+            Self::Top(m) if m > values.len() => Err(fail(format!("there are {} eigenvectors", values.len()))),
+            Self::Top(m) => Ok(first(m)),
+            Self::Energy(share) => {
+                let energy = |j: usize| values[j - 1].iter().map(|x| x * x).sum::<f64>();
+                let total: f64 = order.iter().map(|&j| energy(j)).sum();
+                let mut held = 0.0;
+                let m = order.iter().position(|&j| {
+                    held += energy(j);
+                    held >= share * total
+                });
+                Ok(first(m.map_or(values.len(), |m| m + 1)))
+            }
+            Self::Error(wanted) => {
+                // The error falls as m grows: bisection.
+                let reached = |m: usize| rms_without(&order, m) <= wanted;
+                if !reached(values.len()) {
+                    return Err(fail(format!(
+                        "all {} eigenvectors leave an error of {:.4}",
+                        values.len(),
+                        rms_without(&order, values.len())
+                    )));
+                }
+                let (mut low, mut high) = (0, values.len());
+                while high - low > 1 {
+                    let middle = (low + high) / 2;
+                    if reached(middle) { high = middle } else { low = middle }
+                }
+                Ok(first(high))
+            }
+        }
+    }
+}
+
+impl fmt::Display for Threshold {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Std(c) => write!(f, "std:{c}"),
+            Self::Mean(c) => write!(f, "mean:{c}"),
+            Self::Value(t) => write!(f, "value:{t}"),
+            Self::Top(m) => write!(f, "top:{m}"),
+            Self::Energy(share) => write!(f, "energy:{share}"),
+            Self::Error(length) => write!(f, "error:{length}"),
+        }
+    }
+}
+
+impl FromStr for Threshold {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        let fail = |what: &str| Error::Threshold { rule: text.to_owned(), what: what.to_owned() };
+        let (rule, value) = text.split_once(':').ok_or_else(|| fail("expected RULE:NUMBER"))?;
+        let number: f64 = value
+            .trim()
+            .parse()
+            .ok()
+            .filter(|x: &f64| x.is_finite())
+            .ok_or_else(|| fail("what follows the colon is not a number"))?;
+        let positive = if number > 0.0 { Ok(number) } else { Err(fail("the number must be above zero")) };
+        match rule {
+            "std" => Ok(Self::Std(number)),
+            "mean" => positive.map(Self::Mean),
+            "value" if number >= 0.0 => Ok(Self::Value(number)),
+            "value" => Err(fail("the number must not be negative")),
+            "top" if number >= 1.0 && number.fract() == 0.0 => Ok(Self::Top(number as usize)),
+            "top" => Err(fail("the number must be a whole number from 1")),
+            "energy" if number > 0.0 && number <= 1.0 => Ok(Self::Energy(number)),
+            "energy" => Err(fail("the share must be above 0 and at most 1")),
+            "error" => positive.map(Self::Error),
+            _ => Err(fail("no such rule")),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const VALUES: [[f64; 3]; 4] = [[10.0, 0.0, 0.0], [0.0, -4.0, 0.0], [1.0, 1.0, 1.0], [0.0, 0.0, 6.0]];
+
+    fn selected(rule: &str) -> Result<Vec<usize>, Error> {
+        let rms = |order: &[usize], m: usize| {
+            order[m..].iter().map(|&j| VALUES[j - 1].iter().map(|x| x * x).sum::<f64>()).sum::<f64>().sqrt()
+        };
+        Ok(rule.parse::<Threshold>()?.select(&VALUES, rms)?.eigenvectors)
+    }
+
+    #[test]
+    fn every_rule_selects_by_magnitude() {
+        // Magnitudes: mean 23/12 = 1.917, standard deviation √(155/12 − 1.917²) = 3.040.
+        assert_eq!(selected("std:1").unwrap(), [1, 4]);
+        assert_eq!(selected("std:0.5").unwrap(), [1, 2, 4]);
+        assert_eq!(selected("mean:2").unwrap(), [1, 2, 4]);
+        assert_eq!(selected("value:5").unwrap(), [1, 4]);
+        assert_eq!(selected("value:0.9").unwrap(), [1, 2, 3, 4]);
+        assert_eq!(selected("top:3").unwrap(), [1, 2, 4]);
+        assert_eq!(selected("energy:0.7").unwrap(), [1, 4]); // 136 of 155 is the first to reach it
+        assert_eq!(selected("error:1.8").unwrap(), [1, 2, 4]); // √3 is left
+        assert_eq!(selected("error:0.1").unwrap(), [1, 2, 3, 4]);
+    }
+
+    #[test]
+    fn rules_that_select_nothing_or_make_no_sense_say_so() {
+        for rule in [
+            "std:99", "value:10", "top:5", "top:0", "top:1.5", "energy:0", "energy:2", "error:-1", "mean:0", "half:1",
+            "std", "std:x", "std:nan",
+        ] {
+            let error = selected(rule).unwrap_err();
+            assert!(matches!(error, Error::Threshold { .. }), "{rule}: {error}");
+        }
+    }
+
+    #[test]
+    fn rules_are_written_as_they_are_read() {
+        for rule in ["std:1", "mean:2.5", "value:0.1", "top:14", "energy:0.9", "error:3"] {
+            assert_eq!(rule.parse::<Threshold>().unwrap().to_string(), rule);
+        }
+    }
+}

@@ -1,0 +1,219 @@
+//! Export: arrays and tables that other tools open without a reader of ours.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use npyz::WriterBuilder;
+
+use crate::Error;
+use crate::descriptor::Descriptor;
+use crate::error::io;
+use crate::modes;
+use crate::study::{Coefficients, Column, Loaded, Rows, column_name, store, write_columns};
+
+/// Formats of tables.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Format {
+    /// Comma-separated values.
+    #[default]
+    Csv,
+    /// Parquet.
+    Parquet,
+}
+
+/// What to export.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct ExportOptions<'a> {
+    /// Format of the tables.
+    pub format: Format,
+    /// Only the coefficients of this descriptor, not all K.
+    pub descriptor: Option<&'a Descriptor>,
+    /// Only the last state of each run.
+    pub last: bool,
+}
+
+/// Writes into `folder`: `eigenvalues.npy` [K], `eigenvectors.npy` [K, N], `mass.npy` [N], `baseline.npy` [K, 3],
+/// `vertices.npy` [N, 3], `triangles.npy` [T, 3], `node_ids.npy` [N], `coefficients.npy` [S, |J|, 3] (δ), and the
+/// tables `coefficients`, `runs` and, where there are modes, `modes`. Returns the files.
+///
+/// # Errors
+/// [`Error::Io`], reading errors.
+pub fn export(loaded: &Loaded, folder: &Path, options: &ExportOptions<'_>) -> Result<Vec<PathBuf>, Error> {
+    let &ExportOptions { format, descriptor, last } = options;
+    std::fs::create_dir_all(folder).map_err(io("make the folder", folder))?;
+    let (basis, reference) = (&loaded.basis, &loaded.reference);
+    let (k, n, t) = (basis.eigenpairs() as u64, basis.vertices() as u64, reference.mesh.triangles().len() as u64);
+    let rows = loaded.study.coefficients(
+        descriptor.map(|descriptor| &descriptor.eigenvectors[..]),
+        if last { Rows::Last } else { Rows::All },
+    )?;
+    let path = |name: &str| folder.join(name);
+    let mut files = vec![
+        array(path("eigenvalues.npy"), &[k], basis.eigenvalues.iter().copied())?,
+        array(path("eigenvectors.npy"), &[k, n], basis.eigenvectors.iter().copied())?,
+        array(path("mass.npy"), &[n], basis.mass.iter().copied())?,
+        array(path("baseline.npy"), &[k, 3], basis.baseline.iter().flatten().copied())?,
+        array(path("vertices.npy"), &[n, 3], reference.mesh.vertices().iter().flatten().copied())?,
+        array(path("triangles.npy"), &[t, 3], reference.mesh.triangles().iter().flatten().copied())?,
+        array(path("node_ids.npy"), &[n], reference.node_ids.iter().copied())?,
+        array(
+            path("coefficients.npy"),
+            &[rows.rows() as u64, rows.eigenvectors.len() as u64, 3],
+            rows.values.iter().copied(),
+        )?,
+    ];
+    files.push(table(folder, "coefficients", format, &coefficient_columns(&rows))?);
+    files.push(table(folder, "runs", format, &run_columns(loaded))?);
+    match modes::load(&loaded.study) {
+        Ok(modes) => files.push(table(folder, "modes", format, &mode_columns(&modes))?),
+        Err(Error::NoModes) => {}
+        Err(other) => return Err(other),
+    }
+    Ok(files)
+}
+
+fn array<T: npyz::Serialize + npyz::AutoSerialize>(
+    path: PathBuf,
+    shape: &[u64],
+    values: impl Iterator<Item = T>,
+) -> Result<PathBuf, Error> {
+    store::write_whole(&path, |file| {
+        let mut writer = npyz::WriteOptions::new()
+            .default_dtype()
+            .shape(shape)
+            .writer(&mut *file)
+            .begin_nd()
+            .map_err(io("write", &path))?;
+        writer.extend(values).and_then(|()| writer.finish()).map_err(io("write", &path))
+    })?;
+    Ok(path)
+}
+
+fn coefficient_columns(rows: &Coefficients) -> Vec<(String, Column)> {
+    let mut columns = vec![
+        ("run".to_owned(), Column::Text(rows.runs.iter().cloned().map(Some).collect())),
+        ("state".to_owned(), Column::Count(rows.states.iter().map(|&state| i64::from(state)).collect())),
+        ("time".to_owned(), Column::Number(rows.times.iter().copied().map(Some).collect())),
+    ];
+    for (at, &j) in rows.eigenvectors.iter().enumerate() {
+        for component in 0..3 {
+            let values = (0..rows.rows()).map(|row| Some(f64::from(rows.row(row)[3 * at + component]))).collect();
+            columns.push((column_name(j, component), Column::Number(values)));
+        }
+    }
+    columns
+}
+
+fn run_columns(loaded: &Loaded) -> Vec<(String, Column)> {
+    let manifest = loaded.study.manifest();
+    let runs: Vec<_> = manifest.runs.values().collect();
+    let number = |value: &dyn Fn(&crate::study::RunRecord) -> Option<f64>| {
+        Column::Number(runs.iter().map(|run| value(run)).collect())
+    };
+    let mut columns = vec![
+        ("run".to_owned(), Column::Text(manifest.runs.keys().cloned().map(Some).collect())),
+        ("states".to_owned(), Column::Count(runs.iter().map(|run| run.times.len() as i64).collect())),
+        ("last_time".to_owned(), number(&|run| run.times.last().copied())),
+        ("rms".to_owned(), number(&|run| Some(run.last.rms))),
+        ("max".to_owned(), number(&|run| Some(run.last.max))),
+        ("captured".to_owned(), number(&|run| Some(run.last.captured))),
+        ("rigid_share".to_owned(), number(&|run| Some(run.last.rigid_share))),
+        ("strain_p95".to_owned(), number(&|run| Some(run.last.strain_p95))),
+    ];
+    for name in &manifest.inputs {
+        columns.push((
+            name.clone(),
+            Column::of_texts(runs.iter().map(|run| run.inputs.get(name).map(String::as_str)).collect()),
+        ));
+    }
+    columns
+}
+
+fn mode_columns(modes: &modes::Modes) -> Vec<(String, Column)> {
+    let text = |value: &dyn Fn(&modes::Membership) -> &str| {
+        Column::Text(modes.runs.iter().map(|run| Some(value(run).to_owned())).collect())
+    };
+    vec![
+        ("run".to_owned(), text(&|run| &run.run)),
+        ("mode".to_owned(), text(&|run| &run.mode)),
+        ("distance".to_owned(), Column::Number(modes.runs.iter().map(|run| Some(run.distance)).collect())),
+        ("silhouette".to_owned(), Column::Number(modes.runs.iter().map(|run| Some(run.silhouette)).collect())),
+        ("outlier".to_owned(), Column::Flag(modes.runs.iter().map(|run| run.outlier).collect())),
+    ]
+}
+
+fn table(folder: &Path, name: &str, format: Format, columns: &[(String, Column)]) -> Result<PathBuf, Error> {
+    match format {
+        Format::Parquet => {
+            let path = folder.join(format!("{name}.parquet"));
+            write_columns(&path, columns, None)?;
+            Ok(path)
+        }
+        Format::Csv => {
+            let path = folder.join(format!("{name}.csv"));
+            write_csv(&path, columns)?;
+            Ok(path)
+        }
+    }
+}
+
+fn write_csv(path: &Path, columns: &[(String, Column)]) -> Result<(), Error> {
+    let failed =
+        |error: csv::Error| Error::Io { action: "write", path: path.to_owned(), source: std::io::Error::other(error) };
+    let rows = columns.first().map_or(0, |(_, column)| column.rows());
+    store::write_whole(path, |file| {
+        let mut writer = csv::Writer::from_writer(&mut *file);
+        writer.write_record(columns.iter().map(|(name, _)| name)).map_err(failed)?;
+        for row in 0..rows {
+            writer.write_record(columns.iter().map(|(_, column)| column.cell(row))).map_err(failed)?;
+        }
+        writer.flush().map_err(io("write", path))
+    })
+}
+
+/// Writes a surface as OBJ: for any viewer. `positions` N × 3.
+///
+/// # Errors
+/// [`Error::Io`].
+pub fn write_obj(path: &Path, positions: &[[f64; 3]], triangles: &[[u32; 3]]) -> Result<(), Error> {
+    store::write_whole(path, |file| {
+        let mut lines = || -> std::io::Result<()> {
+            positions.iter().try_for_each(|[x, y, z]| writeln!(file, "v {x} {y} {z}"))?;
+            triangles.iter().try_for_each(|[a, b, c]| writeln!(file, "f {} {} {}", a + 1, b + 1, c + 1))
+        };
+        lines().map_err(io("write", path))
+    })
+}
+
+/// Writes a surface as binary STL. `positions` N × 3.
+///
+/// # Errors
+/// [`Error::Io`].
+pub fn write_stl(path: &Path, positions: &[[f64; 3]], triangles: &[[u32; 3]]) -> Result<(), Error> {
+    store::write_whole(path, |file| {
+        let mut bytes = || -> std::io::Result<()> {
+            let mut head = [b' '; 80];
+            head[..12].copy_from_slice(b"crumple mesh");
+            file.write_all(&head)?;
+            file.write_all(&(triangles.len() as u32).to_le_bytes())?;
+            for triangle in triangles {
+                let corners = triangle.map(|vertex| positions[vertex as usize]);
+                let normal = normal(corners);
+                for x in normal.iter().chain(corners.iter().flatten()) {
+                    file.write_all(&(*x as f32).to_le_bytes())?;
+                }
+                file.write_all(&[0, 0])?;
+            }
+            Ok(())
+        };
+        bytes().map_err(io("write", path))
+    })
+}
+
+/// Unit normal; zero for a triangle without area, as STL readers expect.
+fn normal([a, b, c]: [[f64; 3]; 3]) -> [f64; 3] {
+    let (u, v): ([f64; 3], [f64; 3]) = (std::array::from_fn(|i| b[i] - a[i]), std::array::from_fn(|i| c[i] - a[i]));
+    let n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+    let length = n.iter().map(|x| x * x).sum::<f64>().sqrt();
+    if length > 0.0 { n.map(|x| x / length) } else { [0.0; 3] }
+}

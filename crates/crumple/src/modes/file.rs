@@ -1,0 +1,42 @@
+//! Modes on disk: `modes.parquet`, one row a run, with everything else in its metadata.
+
+use super::Modes;
+use crate::Error;
+use crate::study::{Column, Study, metadata_of, write_columns};
+
+const FILE: &str = "modes.parquet";
+const KEY: &str = "crumple.modes";
+
+/// Writes the modes into their study, in place of those that are there.
+///
+/// # Errors
+/// [`Error::Io`].
+pub fn save(study: &Study, modes: &Modes) -> Result<(), Error> {
+    let medoid = |run: &str| modes.modes.iter().any(|mode| mode.medoid == run);
+    let texts = |text: &dyn Fn(&super::Membership) -> &str| {
+        Column::Text(modes.runs.iter().map(|run| Some(text(run).to_owned())).collect())
+    };
+    let columns = [
+        ("run".to_owned(), texts(&|run| &run.run)),
+        ("mode".to_owned(), texts(&|run| &run.mode)),
+        ("medoid".to_owned(), Column::Flag(modes.runs.iter().map(|run| medoid(&run.run)).collect())),
+        ("distance".to_owned(), Column::Number(modes.runs.iter().map(|run| Some(run.distance)).collect())),
+        ("silhouette".to_owned(), Column::Number(modes.runs.iter().map(|run| Some(run.silhouette)).collect())),
+        ("outlier".to_owned(), Column::Flag(modes.runs.iter().map(|run| run.outlier).collect())),
+    ];
+    let whole = serde_json::to_string(modes).map_err(|error| Error::Internal(error.to_string()))?;
+    write_columns(&study.folder().join(FILE), &columns, Some((KEY, whole)))
+}
+
+/// Reads the modes of a study.
+///
+/// # Errors
+/// [`Error::NoModes`], [`Error::Damaged`].
+pub fn load(study: &Study) -> Result<Modes, Error> {
+    let path = study.folder().join(FILE);
+    if !path.exists() {
+        return Err(Error::NoModes);
+    }
+    let text = metadata_of(&path, KEY)?;
+    serde_json::from_str(&text).map_err(|error| Error::Damaged { path, what: format!("not a table of modes: {error}") })
+}

@@ -1,0 +1,360 @@
+//! Deformation modes: groups of runs that deformed alike, each with the run in its middle.
+//!
+//! The last states of all runs, as points of 3K coefficients δ. Divided by √area, the distance of two points is the
+//! M-weighted RMS distance of the two shapes in the length unit (Parseval).
+
+mod agglomerative;
+mod evidence;
+mod file;
+mod kmeans;
+
+use std::str::FromStr;
+
+use mesh_spectrum::Watch;
+use serde::{Deserialize, Serialize};
+
+pub use evidence::adjusted_rand_index;
+pub(crate) use evidence::silhouettes;
+pub use file::{load, save};
+
+use crate::Error;
+use crate::study::{Coefficients, Rows, Study};
+
+/// How to group.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ModesOptions {
+    /// Number of modes; chosen by the best mean silhouette of 2 to 8 when `None`.
+    pub count: Option<usize>,
+    /// Seed of k-means++. The same seed gives the same modes on any number of threads.
+    pub seed: u64,
+    /// The method.
+    pub method: Method,
+}
+
+impl Default for ModesOptions {
+    fn default() -> Self {
+        Self { count: None, seed: 1, method: Method::KMeans }
+    }
+}
+
+/// How runs are grouped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Method {
+    /// k-means with k-means++ starts and restarts.
+    #[default]
+    KMeans,
+    /// Agglomerative, smallest growth of the sum of squares (Ward).
+    Ward,
+    /// Agglomerative, smallest mean distance.
+    Average,
+}
+
+/// The largest number of modes that is tried when none is given.
+pub const COUNT_MAX: usize = 8;
+
+/// The modes of a study.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Modes {
+    /// The method.
+    pub method: Method,
+    /// The seed.
+    pub seed: u64,
+    /// Whether the number of modes was given, not chosen.
+    pub given: bool,
+    /// Largest modes first.
+    pub modes: Vec<Mode>,
+    /// One entry a run, by run id.
+    pub runs: Vec<Membership>,
+    /// Mean silhouette for each number of modes that was tried.
+    pub tried: Vec<Tried>,
+}
+
+/// One mode.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Mode {
+    /// Its name: `mode-1` is the largest.
+    pub name: String,
+    /// The run in its middle: smallest mean distance to the other members.
+    pub medoid: String,
+    /// Ids of its runs, sorted.
+    pub members: Vec<String>,
+    /// Mean silhouette of its runs, −1 to 1.
+    pub silhouette: f64,
+    /// Root mean square distance of its runs to their mean, in the length unit.
+    pub spread: f64,
+}
+
+/// Where a run belongs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Membership {
+    /// Run id.
+    pub run: String,
+    /// Name of its mode.
+    pub mode: String,
+    /// RMS distance to the medoid of its mode, in the length unit.
+    pub distance: f64,
+    /// Silhouette, −1 to 1: how much nearer its own mode is than the next one.
+    pub silhouette: f64,
+    /// Whether it lies far outside its mode: its distance to the mode's mean is more than three robust standard
+    /// deviations (1.4826 × median absolute deviation) above the mode's median distance. Modes of fewer than five
+    /// runs have no outliers.
+    pub outlier: bool,
+}
+
+/// A number of modes and how good it is.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Tried {
+    /// Number of modes.
+    pub count: usize,
+    /// Mean silhouette.
+    pub silhouette: f64,
+}
+
+/// Groups the last states of all runs of a study.
+///
+/// # Errors
+/// [`Error::TooFewRuns`], [`Error::Value`] for a count that makes no sense, [`Error::Stopped`], reading errors.
+pub fn modes(study: &Study, options: &ModesOptions, watch: &dyn Watch) -> Result<Modes, Error> {
+    let &ModesOptions { count, seed, method } = options;
+    let rows = study.coefficients(None, Rows::Last)?;
+    let runs = rows.rows();
+    if runs < 3 {
+        return Err(Error::TooFewRuns { what: "grouping into modes", needed: 3, have: runs });
+    }
+    if let Some(count) = count.filter(|&count| count == 0 || count > runs) {
+        return Err(Error::Value {
+            name: "--count",
+            value: count.to_string(),
+            expected: format!("1 to the number of runs, {runs}"),
+        });
+    }
+    let area: f64 = study.basis()?.facts.area;
+    let points = Points::of(&rows, area);
+    let distances = points.distances();
+    let counts: Vec<usize> = count.map_or_else(|| (2..=COUNT_MAX.min(runs - 1)).collect(), |count| vec![count]);
+    let mut best: Option<(f64, Vec<usize>)> = None;
+    let mut tried = Vec::new();
+    for (done, &count) in counts.iter().enumerate() {
+        if watch.stopped() {
+            return Err(Error::Stopped);
+        }
+        watch.step("trying numbers of modes", done, counts.len());
+        let groups = match method {
+            Method::KMeans => kmeans::kmeans(&points, count, seed),
+            Method::Ward => agglomerative::agglomerate(&distances, count, agglomerative::Linkage::Ward),
+            Method::Average => agglomerative::agglomerate(&distances, count, agglomerative::Linkage::Average),
+        };
+        let values = silhouettes(&distances, &groups);
+        let mean = values.iter().sum::<f64>() / runs as f64;
+        tried.push(Tried { count, silhouette: mean });
+        // A tie goes to the smaller number of modes, which came first.
+        if best.as_ref().is_none_or(|(most, _)| mean > *most) {
+            best = Some((mean, groups));
+        }
+    }
+    watch.step("trying numbers of modes", counts.len(), counts.len());
+    let groups = best.map(|(_, groups)| groups).unwrap_or_default();
+    Ok(assemble(&rows.runs, &points, &distances, &groups, tried, options))
+}
+
+fn assemble(
+    runs: &[String],
+    points: &Points,
+    distances: &Distances,
+    groups: &[usize],
+    tried: Vec<Tried>,
+    options: &ModesOptions,
+) -> Modes {
+    let values = silhouettes(distances, groups);
+    let count = groups.iter().max().map_or(0, |most| most + 1);
+    let members_of = |group: usize| -> Vec<usize> { (0..runs.len()).filter(|&run| groups[run] == group).collect() };
+    let mut found: Vec<(Vec<usize>, usize)> = (0..count)
+        .map(members_of)
+        .filter(|members| !members.is_empty())
+        .map(|members| (medoid(distances, &members), members))
+        .map(|(medoid, members)| (members, medoid))
+        .collect();
+    found.sort_by(|(a, ma), (b, mb)| b.len().cmp(&a.len()).then(runs[*ma].cmp(&runs[*mb])));
+    let mut modes = Vec::new();
+    let mut memberships = Vec::new();
+    for (index, (members, medoid)) in found.iter().enumerate() {
+        let name = format!("mode-{}", index + 1);
+        let from_mean = points.distances_to_mean(members);
+        let limit = outlier_limit(&from_mean);
+        for (&run, from_mean) in members.iter().zip(&from_mean) {
+            memberships.push(Membership {
+                run: runs[run].clone(),
+                mode: name.clone(),
+                distance: distances.between(run, *medoid),
+                silhouette: values[run],
+                outlier: limit.is_some_and(|limit| *from_mean > limit),
+            });
+        }
+        let mean_square = from_mean.iter().map(|d| d * d).sum::<f64>() / members.len() as f64;
+        modes.push(Mode {
+            name,
+            medoid: runs[*medoid].clone(),
+            members: members.iter().map(|&run| runs[run].clone()).collect(),
+            silhouette: members.iter().map(|&run| values[run]).sum::<f64>() / members.len() as f64,
+            spread: mean_square.sqrt(),
+        });
+    }
+    memberships.sort_by(|a, b| a.run.cmp(&b.run));
+    Modes {
+        method: options.method,
+        seed: options.seed,
+        given: options.count.is_some(),
+        modes,
+        runs: memberships,
+        tried,
+    }
+}
+
+/// The member with the smallest mean distance to the others; ties by order, which is by run id.
+pub(crate) fn medoid(distances: &Distances, members: &[usize]) -> usize {
+    let total = |run: usize| members.iter().map(|&other| distances.between(run, other)).sum::<f64>();
+    members.iter().copied().min_by(|&a, &b| total(a).total_cmp(&total(b))).unwrap_or(0)
+}
+
+fn outlier_limit(distances: &[f64]) -> Option<f64> {
+    if distances.len() < 5 {
+        return None;
+    }
+    let centre = median(distances.to_vec());
+    let deviation = median(distances.iter().map(|d| (d - centre).abs()).collect());
+    // 1.4826: the median absolute deviation of a normal distribution is its standard deviation over 1.4826.
+    Some(centre + 3.0 * 1.4826 * deviation)
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    if values.len().is_multiple_of(2) { (values[middle - 1] + values[middle]) / 2.0 } else { values[middle] }
+}
+
+/// One point a run, in RMS lengths.
+pub(crate) struct Points {
+    pub(crate) width: usize,
+    pub(crate) values: Vec<f64>,
+}
+
+impl Points {
+    pub(crate) fn of(rows: &Coefficients, area: f64) -> Self {
+        let scale = 1.0 / area.sqrt();
+        Self { width: 3 * rows.eigenvectors.len(), values: rows.values.iter().map(|&x| f64::from(x) * scale).collect() }
+    }
+
+    pub(crate) fn count(&self) -> usize {
+        self.values.len() / self.width
+    }
+
+    pub(crate) fn point(&self, run: usize) -> &[f64] {
+        &self.values[run * self.width..(run + 1) * self.width]
+    }
+
+    pub(crate) fn distances(&self) -> Distances {
+        use rayon::prelude::*;
+        let count = self.count();
+        let row = |a: usize| (0..count).map(move |b| square_distance(self.point(a), self.point(b)).sqrt() as f32);
+        Distances { count, values: (0..count).into_par_iter().flat_map_iter(row).collect() }
+    }
+
+    fn distances_to_mean(&self, members: &[usize]) -> Vec<f64> {
+        let mut mean = vec![0.0; self.width];
+        for &run in members {
+            mean.iter_mut().zip(self.point(run)).for_each(|(mean, x)| *mean += x / members.len() as f64);
+        }
+        members.iter().map(|&run| square_distance(self.point(run), &mean).sqrt()).collect()
+    }
+}
+
+pub(crate) fn square_distance(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
+}
+
+/// All distances between runs; f32, so that ten thousand runs take 400 MB.
+pub(crate) struct Distances {
+    pub(crate) count: usize,
+    values: Vec<f32>,
+}
+
+impl Distances {
+    pub(crate) fn between(&self, a: usize, b: usize) -> f64 {
+        f64::from(self.values[a * self.count + b])
+    }
+}
+
+impl FromStr for Method {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        match text {
+            "kmeans" => Ok(Self::KMeans),
+            "ward" => Ok(Self::Ward),
+            "average" => Ok(Self::Average),
+            _ => Err(Error::Value { name: "--method", value: text.into(), expected: "kmeans, ward or average".into() }),
+        }
+    }
+}
+
+impl Modes {
+    /// The mode of this name.
+    ///
+    /// # Errors
+    /// [`Error::UnknownMode`].
+    pub fn mode(&self, name: &str) -> Result<&Mode, Error> {
+        self.modes.iter().find(|mode| mode.name == name).ok_or_else(|| Error::UnknownMode {
+            asked: name.to_owned(),
+            available: self.modes.iter().map(|mode| mode.name.as_str()).collect::<Vec<_>>().join(", "),
+        })
+    }
+
+    /// Ids of the outliers.
+    pub fn outliers(&self) -> Vec<&str> {
+        self.runs.iter().filter(|run| run.outlier).map(|run| run.run.as_str()).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three groups on a line at 0, 100 and 200, three points each, and one far from the last.
+    fn line() -> Points {
+        let values = [0.0, 1.0, 2.0, 100.0, 101.0, 102.0, 200.0, 201.0, 202.0];
+        Points { width: 1, values: values.to_vec() }
+    }
+
+    #[test]
+    fn every_method_finds_groups_that_are_apart() {
+        let points = line();
+        let distances = points.distances();
+        let expected = [0, 0, 0, 1, 1, 1, 2, 2, 2];
+        for groups in [
+            kmeans::kmeans(&points, 3, 7),
+            agglomerative::agglomerate(&distances, 3, agglomerative::Linkage::Ward),
+            agglomerative::agglomerate(&distances, 3, agglomerative::Linkage::Average),
+        ] {
+            assert_eq!(adjusted_rand_index(&groups, &expected), 1.0, "{groups:?}");
+            assert!(silhouettes(&distances, &groups).iter().all(|&s| s > 0.97));
+        }
+    }
+
+    #[test]
+    fn the_medoid_is_in_the_middle_and_outliers_are_far() {
+        let points = Points { width: 1, values: vec![0.0, 1.0, 2.0, 3.0, 4.0, 60.0] };
+        let distances = points.distances();
+        assert_eq!(medoid(&distances, &[0, 1, 2, 3, 4, 5]), 2);
+        let from_mean = points.distances_to_mean(&[0, 1, 2, 3, 4, 5]);
+        let limit = outlier_limit(&from_mean).unwrap();
+        assert_eq!(from_mean.iter().map(|&d| d > limit).collect::<Vec<_>>(), [false, false, false, false, false, true]);
+        assert_eq!(outlier_limit(&from_mean[..4]), None);
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_groups() {
+        let points = Points { width: 2, values: (0..80).map(|i| f64::from((i * 37) % 53)).collect() };
+        assert_eq!(kmeans::kmeans(&points, 5, 3), kmeans::kmeans(&points, 5, 3));
+    }
+}

@@ -1,0 +1,196 @@
+//! The reference mesh: the surface that all runs of a study share.
+//!
+//! Faces of the chosen parts in the reference run's undeformed geometry; vertices that no face uses are dropped. A run
+//! belongs to the mesh by node ids and connectivity. The part of an element does not matter there: a notch may be a
+//! part of its own in one run and none in the next.
+
+use std::collections::{HashMap, HashSet};
+
+use mesh_spectrum::Mesh;
+
+use crate::Error;
+use crate::run::Run;
+
+/// The surface, with what is needed to find it again in another run.
+#[derive(Debug, Clone)]
+pub struct Reference {
+    /// The triangle mesh, undeformed, in the model's length unit.
+    pub mesh: Mesh,
+    /// Index of the shell that each triangle comes from, T.
+    pub face_of_triangle: Vec<u32>,
+    /// User id of each vertex's node, N.
+    pub node_ids: Vec<u64>,
+    /// Labels of the parts it was taken from.
+    pub parts: Vec<String>,
+}
+
+/// Where a run's nodes are, and what was noticed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Placement {
+    /// For each vertex of the mesh the index of its node in the run, N.
+    pub node_of_vertex: Vec<u32>,
+    /// Largest distance between the undeformed positions in the run and in the reference, in the length unit.
+    pub offset_max: f64,
+}
+
+/// A face by the user ids of its nodes, in rising order: the same face in any run, whatever the order of its corners.
+type FaceKey = [u64; 4];
+
+impl Reference {
+    /// Takes the shells of the named parts (ids or titles; all shells when none is named) of a run.
+    ///
+    /// # Errors
+    /// [`Error::NoSurface`], [`Error::UnknownPart`], [`Error::Mesh`].
+    pub fn of_run(run: &Run, parts: &[String]) -> Result<Self, Error> {
+        let all = run.parts();
+        let chosen = choose_parts(run, &all, parts)?;
+        let faces: Vec<[u32; 4]> = run
+            .faces()
+            .filter(|(_, part)| chosen.get(*part as usize).copied().unwrap_or(parts.is_empty()))
+            .map(|(face, _)| face)
+            .collect();
+        if faces.is_empty() {
+            return Err(Error::NoSurface { run: run.id().to_owned(), found: run.contents() });
+        }
+        let (vertex_of_node, nodes) = used_nodes(run.node_ids().len(), &faces);
+        let vertices = nodes.iter().map(|&node| run.undeformed()[node as usize]).collect();
+        let faces: Vec<[u32; 4]> = faces.iter().map(|face| face.map(|node| vertex_of_node[node as usize])).collect();
+        let mesh =
+            Mesh::from_faces(vertices, &faces).map_err(|source| Error::Mesh { run: run.id().to_owned(), source })?;
+        let node_ids = nodes.iter().map(|&node| run.node_ids()[node as usize]).collect();
+        let labels = all.iter().zip(&chosen).filter(|(_, chosen)| **chosen).map(|(part, _)| part.label()).collect();
+        Ok(Self { face_of_triangle: mesh.face_of_triangle().to_vec(), mesh, node_ids, parts: labels })
+    }
+
+    /// Number of vertices N.
+    pub fn vertices(&self) -> usize {
+        self.node_ids.len()
+    }
+
+    /// Finds the mesh in a run.
+    ///
+    /// # Errors
+    /// [`Error::OtherMesh`] naming the first node or face that is not there.
+    pub fn place(&self, run: &Run) -> Result<Placement, Error> {
+        let other = |what: String| Error::OtherMesh { run: run.id().to_owned(), what };
+        let node_of_id: HashMap<u64, u32> = run.node_ids().iter().zip(0..).map(|(&id, node)| (id, node)).collect();
+        let node_of_vertex: Vec<u32> = self
+            .node_ids
+            .iter()
+            .map(|id| {
+                node_of_id.get(id).copied().ok_or_else(|| {
+                    other(format!(
+                        "node {id} of the mesh is not in the run ({} nodes there, {} vertices here)",
+                        run.node_ids().len(),
+                        self.vertices()
+                    ))
+                })
+            })
+            .collect::<Result<_, _>>()?;
+        let ids = run.node_ids();
+        let there: HashSet<FaceKey> =
+            run.faces().map(|(face, _)| face_key(face.map(|node| ids[node as usize]))).collect();
+        for key in self.face_keys() {
+            if !there.contains(&key) {
+                return Err(other(format!(
+                    "no shell of the run joins nodes {}",
+                    key.map(|id| id.to_string()).join(", ")
+                )));
+            }
+        }
+        let undeformed = run.undeformed();
+        let offset = |(vertex, &node): (usize, &u32)| distance(self.mesh.vertices()[vertex], undeformed[node as usize]);
+        let offset_max = node_of_vertex.iter().enumerate().map(offset).fold(0.0, f64::max);
+        Ok(Placement { node_of_vertex, offset_max })
+    }
+
+    /// Positions of the mesh's vertices in one state of a run, N × 3.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`] naming the first node without a usable position, and reading errors.
+    pub fn shape(&self, run: &Run, placement: &Placement, state: usize) -> Result<Vec<[f64; 3]>, Error> {
+        let positions = run.positions(state)?;
+        let shape: Vec<[f64; 3]> = placement.node_of_vertex.iter().map(|&node| positions[node as usize]).collect();
+        let broken = |point: &[f64; 3]| !point.iter().all(|x| x.is_finite());
+        if let Some(first) = shape.iter().position(broken) {
+            return Err(Error::NotFinite {
+                run: run.id().to_owned(),
+                state,
+                time: run.times()[state],
+                count: shape.iter().filter(|point| broken(point)).count(),
+                vertices: shape.len(),
+                node: self.node_ids[first],
+            });
+        }
+        Ok(shape)
+    }
+
+    /// The input faces, each by its node ids; a quad is put together again from its two triangles.
+    fn face_keys(&self) -> Vec<FaceKey> {
+        let ids_of = |triangle: &[u32; 3]| triangle.map(|vertex| self.node_ids[vertex as usize]);
+        let mut keys = Vec::new();
+        let mut triangles = self.mesh.triangles().iter().zip(&self.face_of_triangle).peekable();
+        while let Some((triangle, face)) = triangles.next() {
+            let [a, b, c] = ids_of(triangle);
+            let other_half = triangles.next_if(|(_, next)| *next == face).map(|(triangle, _)| ids_of(triangle));
+            let fourth = other_half.and_then(|ids| ids.into_iter().find(|id| ![a, b, c].contains(id)));
+            keys.push(face_key([a, b, c, fourth.unwrap_or(c)]));
+        }
+        keys
+    }
+}
+
+fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (0..3).map(|c| (a[c] - b[c]).powi(2)).sum::<f64>().sqrt()
+}
+
+fn choose_parts(run: &Run, all: &[crate::run::Part], asked: &[String]) -> Result<Vec<bool>, Error> {
+    let mut chosen: Vec<bool> = all.iter().map(|part| asked.is_empty() && part.shells > 0).collect();
+    for name in asked {
+        let matches = |part: &crate::run::Part| {
+            part.shells > 0 && (part.id.to_string() == *name || part.title.eq_ignore_ascii_case(name.trim()))
+        };
+        let mut any = false;
+        for (chosen, part) in chosen.iter_mut().zip(all) {
+            if matches(part) {
+                *chosen = true;
+                any = true;
+            }
+        }
+        if !any {
+            let available = all
+                .iter()
+                .filter(|part| part.shells > 0)
+                .map(|part| format!("'{}'", part.label()))
+                .collect::<Vec<_>>()
+                .join(", ");
+            return Err(Error::UnknownPart { run: run.id().to_owned(), asked: name.clone(), available });
+        }
+    }
+    Ok(chosen)
+}
+
+/// New index of each node (`u32::MAX` for unused ones), and the used nodes in rising order.
+fn used_nodes(nodes: usize, faces: &[[u32; 4]]) -> (Vec<u32>, Vec<u32>) {
+    let mut vertex_of_node = vec![u32::MAX; nodes];
+    for &node in faces.iter().flatten() {
+        vertex_of_node[node as usize] = 0;
+    }
+    let mut used = Vec::new();
+    for (node, vertex) in (0..).zip(vertex_of_node.iter_mut()) {
+        if *vertex == 0 {
+            *vertex = used.len() as u32;
+            used.push(node);
+        }
+    }
+    (vertex_of_node, used)
+}
+
+/// Distinct ids in rising order, the last one repeated where there are fewer than four.
+fn face_key(ids: [u64; 4]) -> FaceKey {
+    let mut key = ids;
+    key.sort_unstable();
+    let mut distinct: Vec<u64> = key.to_vec();
+    distinct.dedup();
+    std::array::from_fn(|corner| distinct[corner.min(distinct.len() - 1)])
+}

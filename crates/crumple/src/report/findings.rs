@@ -1,0 +1,464 @@
+//! Everything the report shows, as plain data.
+
+use std::collections::BTreeMap;
+
+use base64::Engine;
+use mesh_spectrum::Watch;
+use serde::Serialize;
+
+use super::picture::{View, picture};
+use super::thin::Thin;
+use crate::Error;
+use crate::descriptor::{self, DescribeOptions, Described, Rival, describe};
+use crate::modes::{Mode, Modes, Tried};
+use crate::project::synthesize;
+use crate::reconstruct::{Errors, displaced};
+use crate::similarity::{Comparer, SimilarityOptions};
+use crate::study::{Loaded, Rows, RunRecord};
+use crate::target::Named;
+
+/// What the page gets.
+#[derive(Debug, Clone, Serialize)]
+pub struct Findings {
+    title: String,
+    version: &'static str,
+    study: StudyFacts,
+    warnings: Vec<String>,
+    mesh: MeshData,
+    shapes: BTreeMap<String, String>,
+    cloud: Cloud,
+    inputs: Vec<String>,
+    runs: Vec<RunData>,
+    modes: Vec<ModeData>,
+    silhouettes: Vec<Tried>,
+    count_chosen_by: &'static str,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct StudyFacts {
+    reference: String,
+    parts: Vec<String>,
+    vertices: usize,
+    triangles: usize,
+    components: usize,
+    joined: Option<f64>,
+    join_advice: Option<String>,
+    eigenpairs: usize,
+    length_unit: String,
+    time_unit: String,
+    area: f64,
+    residual: f64,
+    orthogonality: f64,
+    complete: bool,
+    states: usize,
+    captured: f64,
+    isometry: Option<String>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct MeshData {
+    /// Little-endian u32, 3 a triangle, base64.
+    triangles: String,
+    vertices: usize,
+    /// A position is origin + step × u16.
+    origin: [f64; 3],
+    step: f64,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct Cloud {
+    eigenvector: usize,
+    eigenvalue: f64,
+    label: String,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct RunData {
+    id: String,
+    mode: Option<String>,
+    outlier: bool,
+    times: Vec<f64>,
+    cloud: Vec<[f64; 3]>,
+    similarity: BTreeMap<String, f64>,
+    distance_to_medoid: Option<f64>,
+    silhouette: Option<f64>,
+    max_displacement: f64,
+    rigid_share: f64,
+    captured: f64,
+    strain: f64,
+    inputs: Vec<Option<String>>,
+    warnings: Vec<String>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct ModeData {
+    name: String,
+    medoid: String,
+    members: Vec<String>,
+    silhouette: f64,
+    spread: f64,
+    color: usize,
+    words: String,
+    picture: String,
+    descriptor: DescriptorData,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct DescriptorData {
+    select: &'static str,
+    rule: String,
+    threshold: f64,
+    size: usize,
+    numbers: usize,
+    eigenvectors: Vec<usize>,
+    errors: Errors,
+    rivals: Vec<Rival>,
+    spectrum: Vec<[f64; 3]>,
+    nearest: Vec<Nearest>,
+    shapes: BTreeMap<&'static str, String>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct Nearest {
+    run: String,
+    similarity: f64,
+}
+
+impl Findings {
+    /// The study's name.
+    pub fn title(&self) -> &str {
+        &self.title
+    }
+}
+
+/// Name of a mode, and the similarity of each run to its descriptor, runs in the order of the manifest.
+type Similarities = (String, Vec<(String, f64)>);
+
+/// Shapes on the page take at most this many bytes before base64.
+const SHAPE_BYTES: usize = 3_500_000;
+
+/// Gathers the findings of a study whose modes are known. A mode's descriptor is made as the saved descriptor of its
+/// name was, or by `options` where there is none.
+///
+/// # Errors
+/// Those of [`describe`], [`Error::Stopped`], reading errors.
+pub fn findings(
+    loaded: &Loaded,
+    modes: &Modes,
+    options: &DescribeOptions,
+    watch: &dyn Watch,
+) -> Result<Findings, Error> {
+    let mut described = Vec::new();
+    for (done, mode) in modes.modes.iter().enumerate() {
+        if watch.stopped() {
+            return Err(Error::Stopped);
+        }
+        watch.step("drawing modes", done, modes.modes.len());
+        described.push(describe(
+            loaded,
+            &Named { run: mode.medoid.clone(), state: None },
+            Some(&mode.name),
+            &mode.name,
+            &options_of(loaded, mode, options),
+        )?);
+    }
+    watch.step("drawing modes", modes.modes.len(), modes.modes.len());
+    let study = &loaded.study;
+    let manifest = study.manifest();
+    let cloud = (loaded.basis.facts.null_space + 1).min(loaded.basis.eigenpairs());
+    let similarity = similarities(loaded, &described)?;
+    let runs = run_data(loaded, modes, cloud, &similarity)?;
+    let range =
+        described.iter().flat_map(|d| z_displacement(loaded, &d.original)).fold(0.0, |most: f64, z| most.max(z.abs()));
+    let (mesh, shapes) = shapes(loaded, modes, &described)?;
+    let modes_data = modes
+        .modes
+        .iter()
+        .zip(&described)
+        .enumerate()
+        .map(|(color, (mode, described))| mode_data(loaded, mode, described, color, range, &similarity))
+        .collect();
+    Ok(Findings {
+        title: study
+            .folder()
+            .canonicalize()
+            .unwrap_or_else(|_| study.folder().to_owned())
+            .file_name()
+            .map_or_else(|| "study".into(), |name| name.to_string_lossy().into_owned()),
+        version: env!("CARGO_PKG_VERSION"),
+        study: study_facts(loaded),
+        warnings: warnings(loaded),
+        mesh,
+        shapes,
+        cloud: Cloud {
+            eigenvector: cloud,
+            eigenvalue: loaded.basis.eigenvalues[cloud - 1],
+            label: format!("eigenvector {cloud}, the first that is not constant"),
+        },
+        inputs: manifest.inputs.clone(),
+        runs,
+        modes: modes_data,
+        silhouettes: modes.tried.clone(),
+        count_chosen_by: if modes.given { "given" } else { "silhouette" },
+    })
+}
+
+fn options_of(loaded: &Loaded, mode: &Mode, options: &DescribeOptions) -> DescribeOptions {
+    let saved = descriptor::load(&loaded.study, &mode.name).ok().filter(|saved| saved.run == mode.medoid);
+    let as_saved =
+        saved.and_then(|saved| Some(DescribeOptions { select: saved.select, threshold: saved.rule.parse().ok()? }));
+    as_saved.unwrap_or_else(|| options.clone())
+}
+
+fn study_facts(loaded: &Loaded) -> StudyFacts {
+    let Loaded { study, reference, basis } = loaded;
+    let (settings, facts) = (study.settings(), &basis.facts);
+    let records: Vec<&RunRecord> = study.manifest().runs.values().collect();
+    let unit = &settings.length_unit;
+    StudyFacts {
+        reference: settings.reference.clone(),
+        parts: settings.parts.clone(),
+        vertices: reference.vertices(),
+        triangles: reference.mesh.triangles().len(),
+        components: facts.components,
+        joined: facts.join,
+        join_advice: facts.join_advice.map(|distance| join_words(facts.components, distance, unit)),
+        eigenpairs: basis.eigenpairs(),
+        length_unit: unit.clone(),
+        time_unit: settings.time_unit.clone(),
+        area: facts.area,
+        residual: facts.residual_stored,
+        orthogonality: facts.orthogonality,
+        complete: facts.complete,
+        states: records.iter().map(|run| run.times.len()).sum(),
+        captured: records.iter().map(|run| run.last.captured).fold(1.0, f64::min),
+        isometry: isometry_words(&records),
+    }
+}
+
+/// In words: the mesh is several pieces, what that does, and what helps.
+pub(crate) fn join_words(components: usize, distance: f64, unit: &str) -> String {
+    format!(
+        "the mesh is {components} pieces that share no nodes, a small distance apart; each has a spectrum of its own, equal pieces bring nearly equal eigenvalues in pairs. \
+         To treat them as one part: --join {distance} ({unit})"
+    )
+}
+
+/// How far the surfaces are from isometric, in words.
+fn isometry_words(records: &[&RunRecord]) -> Option<String> {
+    let mut strains: Vec<f64> = records.iter().map(|run| run.last.strain_p95).collect();
+    strains.sort_by(f64::total_cmp);
+    let median = *strains.get(strains.len() / 2)?;
+    let thin = if median > 0.1 {
+        "; the method assumes that the surface hardly stretches, and here it does in places, so compare shapes, not small differences"
+    } else {
+        ""
+    };
+    Some(format!(
+        "in the last state of a typical run, 95 % of the edges change their length by less than {:.1} %{thin}",
+        100.0 * median
+    ))
+}
+
+fn warnings(loaded: &Loaded) -> Vec<String> {
+    let facts = &loaded.basis.facts;
+    let mut warnings = Vec::new();
+    if facts.non_manifold_edges > 0 {
+        warnings.push(format!(
+            "{} edges of the mesh have more than two faces; all their faces are summed",
+            facts.non_manifold_edges
+        ));
+    }
+    if facts.flat_triangles > 0 {
+        warnings.push(format!("{} triangles without area are left out of the operator", facts.flat_triangles));
+    }
+    warnings
+}
+
+/// Similarity of every run to every mode's descriptor.
+fn similarities(loaded: &Loaded, described: &[Described]) -> Result<Vec<Similarities>, Error> {
+    let of = |described: &Described| {
+        let comparer = Comparer::new(loaded, &described.descriptor, SimilarityOptions::default())?;
+        let rows = loaded.study.coefficients(Some(comparer.eigenvectors()), Rows::Last)?;
+        let scores =
+            (0..rows.rows()).map(|row| (rows.runs[row].clone(), comparer.score(rows.row(row)).similarity)).collect();
+        Ok((described.descriptor.name.clone(), scores))
+    };
+    described.iter().map(of).collect()
+}
+
+fn run_data(loaded: &Loaded, modes: &Modes, cloud: usize, similarity: &[Similarities]) -> Result<Vec<RunData>, Error> {
+    let manifest = loaded.study.manifest();
+    let rows = loaded.study.coefficients(Some(&[cloud]), Rows::All)?;
+    let mut clouds: BTreeMap<&str, Vec<[f64; 3]>> = BTreeMap::new();
+    let baseline = loaded.basis.baseline[cloud - 1];
+    for row in 0..rows.rows() {
+        let delta = rows.row(row);
+        clouds.entry(&rows.runs[row]).or_default().push(std::array::from_fn(|c| baseline[c] + f64::from(delta[c])));
+    }
+    let membership: BTreeMap<&str, _> = modes.runs.iter().map(|run| (run.run.as_str(), run)).collect();
+    let by_run: BTreeMap<&str, BTreeMap<String, f64>> =
+        similarity.iter().fold(BTreeMap::new(), |mut by_run, (mode, scores)| {
+            for (run, score) in scores {
+                by_run.entry(run.as_str()).or_insert_with(BTreeMap::new).insert(mode.clone(), *score);
+            }
+            by_run
+        });
+    let data = manifest.runs.iter().map(|(id, record)| {
+        let member = membership.get(id.as_str());
+        RunData {
+            id: id.clone(),
+            mode: member.map(|member| member.mode.clone()),
+            outlier: member.is_some_and(|member| member.outlier),
+            times: record.times.clone(),
+            cloud: clouds.remove(id.as_str()).unwrap_or_default(),
+            similarity: by_run.get(id.as_str()).cloned().unwrap_or_default(),
+            distance_to_medoid: member.map(|member| member.distance),
+            silhouette: member.map(|member| member.silhouette),
+            max_displacement: record.last.max,
+            rigid_share: record.last.rigid_share,
+            captured: record.last.captured,
+            strain: record.last.strain_p95,
+            inputs: manifest.inputs.iter().map(|column| record.inputs.get(column).cloned()).collect(),
+            warnings: record.warnings.clone(),
+        }
+    });
+    Ok(data.collect())
+}
+
+fn z_displacement(loaded: &Loaded, shape: &[[f64; 3]]) -> Vec<f64> {
+    shape.iter().zip(loaded.reference.mesh.vertices()).map(|(p, q)| p[2] - q[2]).collect()
+}
+
+fn mode_data(
+    loaded: &Loaded,
+    mode: &Mode,
+    described: &Described,
+    color: usize,
+    range: f64,
+    similarity: &[Similarities],
+) -> ModeData {
+    let descriptor = &described.descriptor;
+    let values = z_displacement(loaded, &described.original);
+    let png = picture(&described.original, loaded.reference.mesh.triangles(), &values, range, &View::default());
+    let mut nearest: Vec<Nearest> = similarity
+        .iter()
+        .filter(|(name, _)| *name == mode.name)
+        .flat_map(|(_, scores)| scores)
+        .filter(|(run, _)| *run != mode.medoid)
+        .map(|(run, similarity)| Nearest { run: run.clone(), similarity: *similarity })
+        .collect();
+    nearest.sort_by(|a, b| b.similarity.total_cmp(&a.similarity).then_with(|| a.run.cmp(&b.run)));
+    nearest.truncate(9);
+    let shape = |what: &str| format!("{}:{what}", mode.name);
+    ModeData {
+        name: mode.name.clone(),
+        medoid: mode.medoid.clone(),
+        members: mode.members.clone(),
+        silhouette: mode.silhouette,
+        spread: mode.spread,
+        color,
+        words: mode_words(loaded, &described.original),
+        picture: format!("data:image/png;base64,{}", base64::engine::general_purpose::STANDARD.encode(png)),
+        descriptor: DescriptorData {
+            select: descriptor.select.word(),
+            rule: descriptor.rule.clone(),
+            threshold: descriptor.threshold,
+            size: descriptor.eigenvectors.len(),
+            numbers: 3 * descriptor.eigenvectors.len(),
+            eigenvectors: descriptor.eigenvectors.clone(),
+            errors: descriptor.errors,
+            rivals: descriptor.rivals.clone(),
+            spectrum: described.values.iter().map(|triple| triple.map(f64::abs)).collect(),
+            nearest,
+            shapes: BTreeMap::from([
+                ("original", format!("run:{}", mode.medoid)),
+                ("first_k", shape("first_k")),
+                ("descriptor", shape("descriptor")),
+                ("first_m", shape("first_m")),
+            ]),
+        },
+    }
+}
+
+/// What the medoid did, in numbers that an engineer reads off a picture: the change along its longest axis, and how
+/// far it rose and fell.
+fn mode_words(loaded: &Loaded, shape: &[[f64; 3]]) -> String {
+    let before = loaded.reference.mesh.vertices();
+    let unit = &loaded.study.settings().length_unit;
+    let extent = |points: &[[f64; 3]], c: usize| {
+        let (low, high) =
+            points.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), p| (low.min(p[c]), high.max(p[c])));
+        high - low
+    };
+    let axis = (0..3).max_by(|&a, &b| extent(before, a).total_cmp(&extent(before, b))).unwrap_or(0);
+    let (rise, fall) = z_displacement(loaded, shape)
+        .into_iter()
+        .fold((0.0_f64, 0.0_f64), |(rise, fall), z| (rise.max(z), fall.min(z)));
+    format!(
+        "{} from {:.0} to {:.0} {unit} along {}; rises by up to {rise:.0} {unit}, falls by up to {:.0} {unit} (z)",
+        if extent(shape, axis) < extent(before, axis) { "shortens" } else { "grows" },
+        extent(before, axis),
+        extent(shape, axis),
+        ['x', 'y', 'z'][axis],
+        -fall
+    )
+}
+
+/// Quantised shapes: those of the modes, then as many runs as the page has room for.
+fn shapes(
+    loaded: &Loaded,
+    modes: &Modes,
+    described: &[Described],
+) -> Result<(MeshData, BTreeMap<String, String>), Error> {
+    let reference = &loaded.reference;
+    let needed = 4 * described.len() + 1;
+    let thin = Thin::of(reference.mesh.vertices(), reference.mesh.triangles(), (SHAPE_BYTES / 6 / needed).max(1000));
+    let mut wanted: Vec<(String, Vec<[f64; 3]>)> = vec![("reference".into(), thin.shape(reference.mesh.vertices()))];
+    for (mode, described) in modes.modes.iter().zip(described) {
+        wanted.push((format!("run:{}", mode.medoid), thin.shape(&described.original)));
+        wanted.push((format!("{}:first_k", mode.name), thin.shape(&described.first_k)));
+        wanted.push((format!("{}:descriptor", mode.name), thin.shape(&described.reconstruction)));
+        wanted.push((format!("{}:first_m", mode.name), thin.shape(&described.first_m)));
+    }
+    let room = (SHAPE_BYTES / (6 * thin.vertices.len())).saturating_sub(wanted.len());
+    let others = loaded
+        .study
+        .manifest()
+        .runs
+        .iter()
+        .filter(|(id, _)| modes.modes.iter().all(|mode| mode.medoid != **id))
+        .take(room);
+    for (id, record) in others {
+        wanted.push((format!("run:{id}"), thin.shape(&last_shape(loaded, id, record)?)));
+    }
+    let points = || wanted.iter().flat_map(|(_, shape)| shape);
+    let origin: [f64; 3] = std::array::from_fn(|c| points().map(|p| p[c]).fold(f64::INFINITY, f64::min));
+    let extent = (0..3).map(|c| points().map(|p| p[c] - origin[c]).fold(0.0, f64::max)).fold(0.0, f64::max);
+    let step = if extent > 0.0 { extent / 65535.0 } else { 1.0 };
+    let encode = |bytes: Vec<u8>| base64::engine::general_purpose::STANDARD.encode(bytes);
+    let quantised = |shape: &[[f64; 3]]| {
+        encode(
+            shape
+                .iter()
+                .flat_map(|p| (0..3).flat_map(|c| (((p[c] - origin[c]) / step).round() as u16).to_le_bytes()))
+                .collect(),
+        )
+    };
+    let shapes = wanted.iter().map(|(name, shape)| (name.clone(), quantised(shape))).collect();
+    let triangles = encode(thin.triangles.iter().flatten().flat_map(|vertex| vertex.to_le_bytes()).collect());
+    Ok((MeshData { triangles, vertices: thin.vertices.len(), origin, step }, shapes))
+}
+
+/// The last state of a run from its file; where that is gone, from its K coefficients.
+fn last_shape(loaded: &Loaded, id: &str, record: &RunRecord) -> Result<Vec<[f64; 3]>, Error> {
+    let state = record.times.len().saturating_sub(1);
+    if let Ok(shape) = loaded.study.shape(&loaded.reference, id, state) {
+        return Ok(shape);
+    }
+    let rows = loaded.study.coefficients(None, Rows::Run(id))?;
+    let delta: Vec<[f64; 3]> =
+        rows.row(state).as_chunks().0.iter().map(|triple: &[f32; 3]| triple.map(f64::from)).collect();
+    let all: Vec<usize> = (1..=loaded.basis.eigenpairs()).collect();
+    Ok(displaced(&loaded.reference, &synthesize(&loaded.basis, &all, &delta)))
+}

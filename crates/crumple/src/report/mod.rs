@@ -1,0 +1,12 @@
+//! The report: one self-contained page for a person.
+//!
+//! [`findings`] gathers everything that the page shows as plain data; [`page`] is a pure function of it. The page and
+//! any other reader of the findings cannot disagree.
+
+mod findings;
+mod page;
+pub mod picture;
+mod thin;
+
+pub use findings::{Findings, findings};
+pub use page::{page, write};

@@ -1,0 +1,356 @@
+//! How alike a shape and a descriptor's target are, and the ranking of runs that follows.
+//!
+//! The paper's measure is the cosine between the target's values on J and the shape's values on J. Options change
+//! what is compared (centred by the study's mean; weighted) or how (Euclidean, Mahalanobis). Ties are broken by run
+//! id and state, so a ranking is reproducible.
+
+use std::str::FromStr;
+
+use faer::linalg::solvers::Solve;
+use faer::{Mat, Side};
+use serde::Serialize;
+
+use crate::Error;
+use crate::descriptor::{Descriptor, Select};
+use crate::study::{Coefficients, Loaded, Rows};
+
+/// What is compared, and how.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SimilarityOptions {
+    /// Subtract the mean of the last states of all runs first. Default: no, as in the paper.
+    pub centred: bool,
+    /// Weights of the coefficients. Default: none, as in the paper.
+    pub weight: Weight,
+    /// The measure. Default: cosine, the paper's.
+    pub metric: Metric,
+}
+
+/// Weights of the coefficients before they are compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Weight {
+    /// All alike.
+    #[default]
+    None,
+    /// √λ: fine detail counts more (the H¹ seminorm).
+    Frequency,
+    /// 1 / standard deviation over the last states of all runs.
+    Spread,
+}
+
+/// The measure.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Metric {
+    /// Cosine of the angle, −1 to 1.
+    #[default]
+    Cosine,
+    /// M-weighted RMS distance on J, in the length unit; similarity 1 / (1 + distance / the target's own RMS).
+    Euclidean,
+    /// Distance in units of the study's spread on J, with the covariance shrunk (Ledoit and Wolf 2004), per
+    /// coefficient; similarity 1 / (1 + distance).
+    Mahalanobis,
+}
+
+/// An answer.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Score {
+    /// −1 to 1; 1 is the same.
+    pub similarity: f64,
+    /// 1 − similarity; for [`Metric::Euclidean`] the distance in the length unit.
+    pub distance: f64,
+}
+
+/// A state found by a search.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Hit {
+    /// Run id.
+    pub run: String,
+    /// State, counted from 0.
+    pub state: u32,
+    /// Its time.
+    pub time: f64,
+    /// How alike.
+    #[serde(flatten)]
+    pub score: Score,
+}
+
+/// Compares states with one descriptor.
+#[derive(Debug, Clone)]
+pub struct Comparer {
+    eigenvectors: Vec<usize>,
+    /// α⁰ on J where coordinates are compared, else zero; 3|J|.
+    offset: Vec<f64>,
+    /// What is subtracted, 3|J|.
+    centre: Vec<f64>,
+    /// What is multiplied, 3|J|.
+    weights: Vec<f64>,
+    /// The target after all that, 3|J|.
+    target: Vec<f64>,
+    metric: Metric,
+    /// 1 / √area: turns length² into an RMS length.
+    to_length: f64,
+    /// Inverse of the shrunk covariance.
+    precision: Option<Mat<f64>>,
+}
+
+impl Comparer {
+    /// Prepares the comparison with a descriptor.
+    ///
+    /// # Errors
+    /// [`Error::TooFewRuns`] where the options need the study's statistics and there are fewer than two runs.
+    pub fn new(loaded: &Loaded, descriptor: &Descriptor, options: SimilarityOptions) -> Result<Self, Error> {
+        let needs_study = options.centred || options.weight == Weight::Spread || options.metric == Metric::Mahalanobis;
+        let rows = if needs_study {
+            Some(loaded.study.coefficients(Some(&descriptor.eigenvectors), Rows::Last)?)
+        } else {
+            None
+        };
+        Self::with_rows(loaded, descriptor, options, rows.as_ref())
+    }
+
+    /// The same with the study's last states on J already at hand.
+    fn with_rows(
+        loaded: &Loaded,
+        descriptor: &Descriptor,
+        options: SimilarityOptions,
+        rows: Option<&Coefficients>,
+    ) -> Result<Self, Error> {
+        let SimilarityOptions { centred, weight, metric } = options;
+        let basis = &loaded.basis;
+        let j = &descriptor.eigenvectors;
+        if let Some(&beyond) = j.iter().find(|&&j| j > basis.eigenpairs()) {
+            return Err(Error::Value {
+                name: "descriptor",
+                value: format!("eigenvector {beyond}"),
+                expected: format!("at most {}", basis.eigenpairs()),
+            });
+        }
+        if let Some(have) = rows.map(Coefficients::rows).filter(|&rows| rows < 2) {
+            return Err(Error::TooFewRuns { what: "centring, spread or Mahalanobis", needed: 2, have });
+        }
+        let offset: Vec<f64> = match descriptor.select {
+            Select::Coordinates => j.iter().flat_map(|&j| basis.baseline[j - 1]).collect(),
+            Select::Difference => vec![0.0; 3 * j.len()],
+        };
+        let values: Option<Vec<Vec<f64>>> =
+            rows.map(|rows| (0..rows.rows()).map(|row| add(rows.row(row), &offset)).collect());
+        let mean = values.as_deref().map(mean_of);
+        let spread = values.as_deref().zip(mean.as_deref()).map(|(values, mean)| spread_of(values, mean));
+        let weights = match (weight, spread) {
+            (Weight::Frequency, _) => j.iter().flat_map(|&j| [basis.eigenvalues[j - 1].max(0.0).sqrt(); 3]).collect(),
+            // A coefficient that never varies says nothing; dividing by its zero spread would make it say everything.
+            (Weight::Spread, Some(spread)) => spread.iter().map(|&s| if s > 0.0 { 1.0 / s } else { 0.0 }).collect(),
+            _ => vec![1.0; 3 * j.len()],
+        };
+        let centre = if centred { mean.unwrap_or_default() } else { vec![0.0; 3 * j.len()] };
+        let mut comparer = Self {
+            eigenvectors: j.clone(),
+            offset,
+            centre,
+            weights,
+            target: Vec::new(),
+            metric,
+            to_length: 1.0 / basis.facts.area.sqrt(),
+            precision: None,
+        };
+        comparer.target = comparer.transform(descriptor.values.iter().flatten().copied().collect());
+        if metric == Metric::Mahalanobis {
+            let values = values.unwrap_or_default().into_iter().map(|row| comparer.transform(row)).collect::<Vec<_>>();
+            comparer.precision = Some(shrunk_precision(&values));
+        }
+        Ok(comparer)
+    }
+
+    /// The eigenvectors whose δ [`Comparer::score`] expects.
+    pub fn eigenvectors(&self) -> &[usize] {
+        &self.eigenvectors
+    }
+
+    /// Compares one state. `delta`: δ on J, 3|J|.
+    pub fn score(&self, delta: &[f32]) -> Score {
+        let value = self.transform(add(delta, &self.offset));
+        match self.metric {
+            Metric::Cosine => {
+                let similarity = cosine(&self.target, &value);
+                Score { similarity, distance: 1.0 - similarity }
+            }
+            Metric::Euclidean => {
+                let distance = self.to_length * norm(&difference(&self.target, &value));
+                let own = self.to_length * norm(&self.target);
+                let similarity = if distance == 0.0 { 1.0 } else { own / (own + distance) };
+                Score { similarity, distance }
+            }
+            Metric::Mahalanobis => {
+                let d = difference(&self.target, &value);
+                let quadratic: f64 = self.precision.as_ref().map_or(0.0, |precision| {
+                    (0..d.len()).map(|i| d[i] * (0..d.len()).map(|j| precision[(i, j)] * d[j]).sum::<f64>()).sum()
+                });
+                let similarity = 1.0 / (1.0 + (quadratic.max(0.0) / d.len() as f64).sqrt());
+                Score { similarity, distance: 1.0 - similarity }
+            }
+        }
+    }
+
+    fn transform(&self, mut values: Vec<f64>) -> Vec<f64> {
+        for ((x, centre), weight) in values.iter_mut().zip(&self.centre).zip(&self.weights) {
+            *x = (*x - centre) * weight;
+        }
+        values
+    }
+}
+
+/// Ranks states by likeness to a descriptor, best first. `rows`: the last state of every run, or every state.
+///
+/// # Errors
+/// As [`Comparer::new`], and reading errors.
+pub fn search(
+    loaded: &Loaded,
+    descriptor: &Descriptor,
+    options: SimilarityOptions,
+    rows: Rows<'_>,
+) -> Result<Vec<Hit>, Error> {
+    let comparer = Comparer::new(loaded, descriptor, options)?;
+    let rows = loaded.study.coefficients(Some(comparer.eigenvectors()), rows)?;
+    let mut hits: Vec<Hit> = (0..rows.rows())
+        .map(|row| Hit {
+            run: rows.runs[row].clone(),
+            state: rows.states[row],
+            time: rows.times[row],
+            score: comparer.score(rows.row(row)),
+        })
+        .collect();
+    rank(&mut hits, options.metric);
+    Ok(hits)
+}
+
+/// Best first; ties by run and state.
+fn rank(hits: &mut [Hit], metric: Metric) {
+    let key = |hit: &Hit| if metric == Metric::Euclidean { hit.score.distance } else { -hit.score.similarity };
+    hits.sort_by(|a, b| key(a).total_cmp(&key(b)).then_with(|| (&a.run, a.state).cmp(&(&b.run, b.state))));
+}
+
+/// Cosine of the angle between two vectors; 0 where one of them is zero (it has no direction), 1 where both are.
+pub fn cosine(a: &[f64], b: &[f64]) -> f64 {
+    let (na, nb) = (norm(a), norm(b));
+    if na == 0.0 && nb == 0.0 {
+        return 1.0;
+    }
+    if na == 0.0 || nb == 0.0 {
+        return 0.0;
+    }
+    (a.iter().zip(b).map(|(a, b)| (a / na) * (b / nb)).sum::<f64>()).clamp(-1.0, 1.0)
+}
+
+fn add(delta: &[f32], offset: &[f64]) -> Vec<f64> {
+    delta.iter().zip(offset).map(|(&x, offset)| f64::from(x) + offset).collect()
+}
+
+fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a - b).collect()
+}
+
+fn norm(a: &[f64]) -> f64 {
+    a.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+fn mean_of(rows: &[Vec<f64>]) -> Vec<f64> {
+    let mut mean = vec![0.0; rows.first().map_or(0, Vec::len)];
+    for row in rows {
+        mean.iter_mut().zip(row).for_each(|(mean, x)| *mean += x / rows.len() as f64);
+    }
+    mean
+}
+
+fn spread_of(rows: &[Vec<f64>], mean: &[f64]) -> Vec<f64> {
+    let variance =
+        |column: usize| rows.iter().map(|row| (row[column] - mean[column]).powi(2)).sum::<f64>() / rows.len() as f64;
+    (0..mean.len()).map(|column| variance(column).sqrt()).collect()
+}
+
+/// Inverse of (1 − ρ) S + ρ μ I, with ρ from Ledoit and Wolf, "A well-conditioned estimator for large-dimensional
+/// covariance matrices" (2004), lemma 3.3.
+fn shrunk_precision(rows: &[Vec<f64>]) -> Mat<f64> {
+    let (n, p) = (rows.len(), rows[0].len());
+    let mean = mean_of(rows);
+    let centred = Mat::from_fn(n, p, |row, column| rows[row][column] - mean[column]);
+    let sample = (centred.transpose() * &centred) * (1.0 / n as f64);
+    let mu = (0..p).map(|i| sample[(i, i)]).sum::<f64>() / p as f64;
+    let square = |matrix: &Mat<f64>| (0..p).map(|j| (0..p).map(|i| matrix[(i, j)].powi(2)).sum::<f64>()).sum::<f64>();
+    let identity = Mat::<f64>::identity(p, p);
+    let d2 = square(&(&sample - &identity * mu)) / p as f64;
+    let fourth: f64 = (0..n).map(|row| (0..p).map(|c| centred[(row, c)].powi(2)).sum::<f64>().powi(2)).sum();
+    let b2 = ((fourth / n as f64 - square(&sample)) / (p as f64 * n as f64)).clamp(0.0, d2);
+    let rho = if d2 > 0.0 { (b2 / d2).max(1e-9) } else { 1.0 };
+    // Where nothing varies at all, distances are measured as they are.
+    let mu = if mu > 0.0 { mu } else { 1.0 };
+    let shrunk = sample * (1.0 - rho) + &identity * (rho * mu);
+    shrunk.llt(Side::Lower).map_or_else(|_| identity.clone(), |factor| factor.solve(&identity))
+}
+
+impl FromStr for Weight {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        match text {
+            "none" => Ok(Self::None),
+            "frequency" => Ok(Self::Frequency),
+            "spread" => Ok(Self::Spread),
+            _ => {
+                Err(Error::Value { name: "--weight", value: text.into(), expected: "none, frequency or spread".into() })
+            }
+        }
+    }
+}
+
+impl FromStr for Metric {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        match text {
+            "cosine" => Ok(Self::Cosine),
+            "euclidean" => Ok(Self::Euclidean),
+            "mahalanobis" => Ok(Self::Mahalanobis),
+            _ => Err(Error::Value {
+                name: "--metric",
+                value: text.into(),
+                expected: "cosine, euclidean or mahalanobis".into(),
+            }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cosine_is_defined_everywhere() {
+        assert_eq!(cosine(&[1.0, 0.0], &[2.0, 0.0]), 1.0);
+        assert_eq!(cosine(&[1.0, 0.0], &[-3.0, 0.0]), -1.0);
+        assert_eq!(cosine(&[0.0, 0.0], &[1.0, 0.0]), 0.0);
+        assert_eq!(cosine(&[0.0, 0.0], &[0.0, 0.0]), 1.0);
+        // No overflow on the way: the squares of these do not fit.
+        assert!(cosine(&[1e200, 0.0], &[1e-200, 0.0]) <= 1.0);
+    }
+
+    #[test]
+    fn ties_are_broken_by_run_and_state() {
+        let hit = |run: &str, state, similarity| Hit {
+            run: run.into(),
+            state,
+            time: 0.0,
+            score: Score { similarity, distance: 1.0 - similarity },
+        };
+        let mut hits = vec![hit("b", 0, 0.5), hit("a", 1, 0.5), hit("a", 0, 0.5), hit("c", 0, 0.9)];
+        rank(&mut hits, Metric::Cosine);
+        let order: Vec<_> = hits.iter().map(|hit| (hit.run.as_str(), hit.state)).collect();
+        assert_eq!(order, [("c", 0), ("a", 0), ("a", 1), ("b", 0)]);
+    }
+
+    #[test]
+    fn shrinking_keeps_the_precision_finite_with_fewer_rows_than_columns() {
+        let rows = vec![vec![1.0, 0.0, 5.0, 2.0], vec![2.0, 0.0, 4.0, 1.0], vec![0.0, 0.0, 7.0, 2.0]];
+        let precision = shrunk_precision(&rows);
+        assert!((0..4).all(|i| (0..4).all(|j| precision[(i, j)].is_finite())));
+        assert!((0..4).all(|i| precision[(i, i)] > 0.0));
+    }
+}

@@ -1,0 +1,260 @@
+//! Adding runs to a study: project them on all cores, write parts, then the manifest.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Mutex;
+
+use rayon::prelude::*;
+
+use super::store::Lock;
+use super::{Error, FileRecord, LOCK, Manifest, RunRecord, Study, WRITERS, absolute, coefficients, tables};
+use crate::basis::Basis;
+use crate::bundle::Found;
+use crate::inputs::Table;
+use crate::project::{Projected, project};
+use crate::reference::Reference;
+use crate::run::Run;
+use mesh_spectrum::Watch;
+
+/// How to add.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct AddOptions<'a> {
+    /// A run whose id is there with another content takes its place. Default: that is an error.
+    pub replace: bool,
+    /// Runs that cannot be used are left out and reported. Default: nothing is added when one of them is bad.
+    pub skip_bad: bool,
+    /// A table of inputs or responses, kept per run.
+    pub params: Option<&'a Table>,
+}
+
+/// What an add did.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Added {
+    /// Ids of the runs that are new.
+    pub added: Vec<String>,
+    /// Ids of the runs that took the place of others.
+    pub replaced: Vec<String>,
+    /// Ids of the runs that were there already.
+    pub unchanged: Vec<String>,
+    /// Runs left out, with the reason.
+    pub skipped: Vec<(String, String)>,
+    /// What the user should know.
+    pub notes: Vec<String>,
+}
+
+/// Runs projected before a part is written: bounds memory, and the work lost when a process is killed.
+const PART_RUNS: usize = 64;
+
+impl Study {
+    /// Projects every state of these runs and adds them. Safe to repeat, to kill, and to run several at once.
+    ///
+    /// Nothing is added when one of the runs is bad, unless `skip_bad`. When the caller stops it, the runs that are
+    /// finished are kept.
+    ///
+    /// # Errors
+    /// The run's own error when there is one run, [`Error::BadRuns`] when there are several; [`Error::RunChanged`],
+    /// [`Error::NoMatch`] for a table that fits no run, [`Error::Stopped`], [`Error::Io`].
+    pub fn add(&mut self, found: &[Found], options: AddOptions<'_>, watch: &dyn Watch) -> Result<Added, Error> {
+        let writers = self.clear_litter()?;
+        let mut result = Added::default();
+        let inputs = self.inputs_of(found, options.params, &mut result.notes)?;
+        let (unchanged, todo): (Vec<&Found>, Vec<&Found>) = found.iter().partition(|run| self.is_here(run));
+        result.unchanged = unchanged.iter().map(|run| run.id.clone()).collect();
+        let work =
+            Work { reference: self.reference()?, basis: self.basis()?, total: todo.len(), done: Mutex::new(0), watch };
+        let mut records: BTreeMap<String, RunRecord> = BTreeMap::new();
+        let mut failures = Vec::new();
+        let mut stopped = false;
+        for batch in todo.chunks(PART_RUNS) {
+            let mut finished: Vec<(Projected, &Found)> = Vec::new();
+            for (run, outcome) in work.project_all(batch) {
+                match outcome {
+                    Ok(projected) => finished.push((projected, run)),
+                    Err(Error::Stopped) => stopped = true,
+                    Err(error) if todo.len() == 1 && !options.skip_bad => return Err(error),
+                    Err(error) => failures.push((run.id.clone(), error.to_string())),
+                }
+            }
+            let projected: Vec<Projected> = finished.iter().map(|(projected, _)| projected.clone()).collect();
+            if !projected.is_empty() {
+                let part = coefficients::write_part(&self.folder, &self.manifest.basis, &projected)?;
+                records.extend(
+                    finished.into_iter().map(|(projected, run)| (run.id.clone(), record(projected, run, &part))),
+                );
+            }
+            if stopped {
+                break;
+            }
+        }
+        if !failures.is_empty() && !options.skip_bad {
+            return Err(Error::BadRuns { failures, total: todo.len() });
+        }
+        result.skipped = failures;
+        self.commit(records, &inputs, options.replace, &mut result)?;
+        drop(writers);
+        if stopped { Err(Error::Stopped) } else { Ok(result) }
+    }
+
+    /// Removes parts that no manifest names, if no writer can own them, and registers this process as a writer.
+    fn clear_litter(&mut self) -> Result<Lock, Error> {
+        let path = self.folder.join(coefficients::FOLDER).join(WRITERS);
+        if let Some(_alone) = Lock::try_exclusive(&path)? {
+            self.refresh()?;
+            for part in coefficients::parts_on_disk(&self.folder)? {
+                let name =
+                    format!("{}/{}", coefficients::FOLDER, part.file_name().unwrap_or_default().to_string_lossy());
+                if !self.manifest.files.contains_key(&name) {
+                    std::fs::remove_file(&part).map_err(crate::error::io("remove", &part))?;
+                }
+            }
+        }
+        Lock::shared(&path)
+    }
+
+    fn is_here(&self, run: &Found) -> bool {
+        self.manifest.runs.get(&run.id).is_some_and(|record| {
+            record.path == absolute(&run.path) && stamp(&run.path).is_some_and(|stamp| stamp == record.stamp)
+        })
+    }
+
+    /// Input values by run id.
+    fn inputs_of(&self, found: &[Found], table: Option<&Table>, notes: &mut Vec<String>) -> Result<Inputs, Error> {
+        let Some(table) = table else { return Ok(Inputs::default()) };
+        let ids: Vec<&str> = found.iter().map(|run| run.id.as_str()).collect();
+        let joined = table.join(&ids)?;
+        notes.extend(joined.notes);
+        let row = |row: Option<usize>| {
+            let values = row.map(|row| &table.rows[row].1);
+            table
+                .columns
+                .iter()
+                .zip(values.into_iter().flatten())
+                .map(|(column, value)| (column.clone(), value.clone()))
+                .collect()
+        };
+        let by_run = ids.iter().zip(joined.row_of_run).map(|(id, found)| ((*id).to_owned(), row(found))).collect();
+        Ok(Inputs { columns: table.columns.clone(), by_run })
+    }
+
+    /// Merges new records into the manifest as it is on disk now, and replaces it.
+    fn commit(
+        &mut self,
+        records: BTreeMap<String, RunRecord>,
+        inputs: &Inputs,
+        replace: bool,
+        result: &mut Added,
+    ) -> Result<(), Error> {
+        let _lock = Lock::exclusive(&self.folder.join(LOCK))?;
+        let before = Manifest::read(&self.folder)?;
+        let mut manifest = before.clone();
+        for (id, mut record) in records {
+            match manifest.runs.get_mut(&id) {
+                Some(there) if there.content == record.content => {
+                    // The same content from another place or with a newer date: its coefficients stay, its whereabouts change.
+                    there.path = record.path;
+                    there.stamp = record.stamp;
+                    result.unchanged.push(id);
+                }
+                Some(_) if !replace => return Err(Error::RunChanged { run: id }),
+                Some(there) => {
+                    record.inputs = std::mem::take(&mut there.inputs);
+                    *there = record;
+                    result.replaced.push(id);
+                }
+                None => {
+                    manifest.runs.insert(id.clone(), record);
+                    result.added.push(id);
+                }
+            }
+        }
+        for column in &inputs.columns {
+            if !manifest.inputs.contains(column) {
+                manifest.inputs.push(column.clone());
+            }
+        }
+        for (id, values) in &inputs.by_run {
+            if let Some(record) = manifest.runs.get_mut(id) {
+                record.inputs.extend(values.clone());
+            }
+        }
+        let used: std::collections::BTreeSet<String> = manifest.runs.values().map(|run| run.part.clone()).collect();
+        manifest.files.retain(|name, _| !name.starts_with(coefficients::FOLDER) || used.contains(name));
+        for part in used {
+            if let std::collections::btree_map::Entry::Vacant(entry) = manifest.files.entry(part) {
+                let file = FileRecord::of(&self.folder.join(entry.key()))?;
+                entry.insert(file);
+            }
+        }
+        manifest.crumple = env!("CARGO_PKG_VERSION").into();
+        result.unchanged.sort();
+        if manifest != before {
+            manifest.write(&self.folder)?;
+        }
+        tables::write_runs(&self.folder, &manifest)?;
+        self.manifest = manifest;
+        Ok(())
+    }
+}
+
+#[derive(Default)]
+struct Inputs {
+    columns: Vec<String>,
+    by_run: BTreeMap<String, BTreeMap<String, String>>,
+}
+
+/// What every projection of an add shares.
+struct Work<'a> {
+    reference: Reference,
+    basis: Basis,
+    total: usize,
+    done: Mutex<usize>,
+    watch: &'a dyn Watch,
+}
+
+impl Work<'_> {
+    fn project_all<'f>(&self, batch: &[&'f Found]) -> Vec<(&'f Found, Result<Projected, Error>)> {
+        batch.par_iter().map(|&run| (run, self.project_one(run))).collect()
+    }
+
+    fn project_one(&self, run: &Found) -> Result<Projected, Error> {
+        if self.watch.stopped() {
+            return Err(Error::Stopped);
+        }
+        let projected = match &run.fault {
+            Some(fault) => Err(Error::NoStates { run: run.path.display().to_string(), reason: format!(": {fault}") }),
+            None => Run::open(&run.id, &run.path)
+                .and_then(|opened| project(&opened, &self.reference, &self.basis, self.watch)),
+        };
+        if let Ok(mut done) = self.done.lock() {
+            *done += 1;
+            self.watch.step("projecting runs", *done, self.total);
+        }
+        projected
+    }
+}
+
+fn record(projected: Projected, run: &Found, part: &str) -> RunRecord {
+    RunRecord {
+        path: absolute(&run.path),
+        stamp: stamp(&run.path).unwrap_or_default(),
+        content: projected.content,
+        part: part.to_owned(),
+        times: projected.states.iter().map(|state| state.time).collect(),
+        last: projected.states.last().map(|state| state.measures).unwrap_or_default(),
+        inputs: BTreeMap::new(),
+        warnings: projected.warnings,
+    }
+}
+
+/// Length and time of change of each file of a family, as one hash; `None` if it cannot be opened.
+fn stamp(root: &Path) -> Option<String> {
+    let mut hasher = blake3::Hasher::new();
+    for (path, bytes) in Run::open("", root).ok()?.files() {
+        let changed = path.metadata().and_then(|metadata| metadata.modified()).ok()?;
+        let changed = changed.duration_since(std::time::UNIX_EPOCH).map_or(0, |since| since.as_nanos());
+        hasher.update(path.file_name()?.as_encoded_bytes());
+        hasher.update(&bytes.to_le_bytes());
+        hasher.update(&changed.to_le_bytes());
+    }
+    Some(hasher.finalize().to_hex()[..16].to_owned())
+}

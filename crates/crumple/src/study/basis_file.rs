@@ -1,0 +1,85 @@
+//! The basis on disk: `basis.safetensors` with eigenvalues [K], eigenvectors [K, N], mass [N], baseline [K, 3].
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use safetensors::tensor::{Dtype, SafeTensors, TensorView};
+
+use super::store;
+use crate::Error;
+use crate::basis::Basis;
+use crate::error::io;
+
+/// Its name in a study's folder.
+pub(crate) const FILE: &str = "basis.safetensors";
+
+pub(crate) fn write(basis: &Basis, path: &Path) -> Result<(), Error> {
+    let (k, n) = (basis.eigenpairs(), basis.vertices());
+    let internal = |error: String| Error::Internal(error);
+    let eigenvalues = f64_bytes(basis.eigenvalues.iter());
+    let mass = f64_bytes(basis.mass.iter());
+    let baseline = f64_bytes(basis.baseline.iter().flatten());
+    let eigenvectors: Vec<u8> = basis.eigenvectors.iter().flat_map(|x| x.to_le_bytes()).collect();
+    let view = |dtype, shape: Vec<usize>, bytes| {
+        TensorView::new(dtype, shape, bytes).map_err(|error| internal(error.to_string()))
+    };
+    let tensors = [
+        ("eigenvalues", view(Dtype::F64, vec![k], &eigenvalues)?),
+        ("eigenvectors", view(Dtype::F32, vec![k, n], &eigenvectors)?),
+        ("mass", view(Dtype::F64, vec![n], &mass)?),
+        ("baseline", view(Dtype::F64, vec![k, 3], &baseline)?),
+    ];
+    let facts = serde_json::to_string(&basis.facts).map_err(|error| internal(error.to_string()))?;
+    let metadata = HashMap::from([("facts".to_owned(), facts)]);
+    let bytes = safetensors::serialize(tensors, Some(metadata)).map_err(|error| internal(error.to_string()))?;
+    store::write_bytes(path, &bytes)
+}
+
+/// Reads a basis; `id` is its content name, from the manifest.
+pub(crate) fn read(path: &Path, id: &str) -> Result<Basis, Error> {
+    let damaged = |what: String| Error::Damaged { path: path.to_owned(), what };
+    let bytes = std::fs::read(path).map_err(io("read", path))?;
+    let (_, metadata) = SafeTensors::read_metadata(&bytes).map_err(|error| damaged(error.to_string()))?;
+    let tensors = SafeTensors::deserialize(&bytes).map_err(|error| damaged(error.to_string()))?;
+    let facts = metadata
+        .metadata()
+        .as_ref()
+        .and_then(|entries| entries.get("facts"))
+        .ok_or_else(|| damaged("no facts in it".into()))?;
+    let facts = serde_json::from_str(facts).map_err(|error| damaged(error.to_string()))?;
+    let tensor = |name: &str, dtype: Dtype| {
+        let tensor = tensors.tensor(name).map_err(|error| damaged(error.to_string()))?;
+        if tensor.dtype() == dtype {
+            Ok(tensor)
+        } else {
+            Err(damaged(format!("{name} is {:?}, expected {dtype:?}", tensor.dtype())))
+        }
+    };
+    let doubles = |name: &str| {
+        Ok::<_, Error>(
+            tensor(name, Dtype::F64)?
+                .data()
+                .as_chunks()
+                .0
+                .iter()
+                .map(|word| f64::from_le_bytes(*word))
+                .collect::<Vec<f64>>(),
+        )
+    };
+    let eigenvalues = doubles("eigenvalues")?;
+    let mass = doubles("mass")?;
+    let baseline: Vec<[f64; 3]> = doubles("baseline")?.as_chunks().0.to_vec();
+    let eigenvectors: Vec<f32> =
+        tensor("eigenvectors", Dtype::F32)?.data().as_chunks().0.iter().map(|word| f32::from_le_bytes(*word)).collect();
+    if eigenvectors.len() != eigenvalues.len() * mass.len()
+        || baseline.len() != eigenvalues.len()
+        || eigenvalues.is_empty()
+    {
+        return Err(damaged("sizes of its arrays do not fit together".into()));
+    }
+    Ok(Basis { id: id.to_owned(), eigenvalues, eigenvectors, mass, baseline, facts })
+}
+
+fn f64_bytes<'a>(values: impl Iterator<Item = &'a f64>) -> Vec<u8> {
+    values.flat_map(|x| x.to_le_bytes()).collect()
+}

@@ -1,0 +1,101 @@
+//! Is the study whole: every file there, with the content that the manifest says, and nothing contradictory.
+
+use std::path::Path;
+
+use super::store::Lock;
+use super::{Error, FileRecord, LOCK, Manifest, Rows, Study, coefficients, tables};
+
+/// What a check found.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct Checkup {
+    /// Whether every answer of the study can be trusted.
+    pub whole: bool,
+    /// What is wrong; empty when whole.
+    pub problems: Vec<String>,
+    /// What is harmless but worth knowing: litter of a killed process, a derived table that is behind.
+    pub notes: Vec<String>,
+    /// Files looked at.
+    pub files: usize,
+    /// Runs in the study.
+    pub runs: usize,
+}
+
+/// Reads the whole study and compares it with its manifest.
+///
+/// # Errors
+/// [`Error::NotAStudy`], [`Error::OtherLayout`]; damage is no error here but an answer.
+pub fn check(folder: &Path) -> Result<Checkup, Error> {
+    let mut problems = Vec::new();
+    let mut notes = Vec::new();
+    let manifest = match Manifest::read(folder) {
+        Err(Error::Damaged { path, what }) => {
+            let problems = vec![format!("{}: {what}", path.display())];
+            return Ok(Checkup { whole: false, problems, notes, files: 1, runs: 0 });
+        }
+        other => other?,
+    };
+    // With the lock, no writer is between a part and its manifest. A study that cannot be written is read without.
+    let _lock = Lock::exclusive(&folder.join(LOCK)).ok();
+    for (name, expected) in &manifest.files {
+        match FileRecord::of(&folder.join(name)) {
+            Ok(found) if found == *expected => {}
+            Ok(found) if found.bytes != expected.bytes => {
+                problems.push(format!("{name}: {} bytes, the manifest says {}", found.bytes, expected.bytes))
+            }
+            Ok(_) => problems.push(format!("{name}: its content is not what the manifest says")),
+            Err(error) => problems.push(format!("{name}: {error}")),
+        }
+    }
+    if problems.is_empty() {
+        problems.extend(contradictions(folder, &manifest));
+    }
+    notes.extend(litter(folder, &manifest));
+    match tables::read_strings(&folder.join("runs.parquet"), "run") {
+        Ok(runs) if runs.iter().eq(manifest.runs.keys()) => {}
+        Ok(_) => notes.push("runs.parquet is behind the manifest; the next add renews it".into()),
+        Err(error) => notes.push(format!("{error}; the next add renews it")),
+    }
+    Ok(Checkup {
+        whole: problems.is_empty(),
+        problems,
+        notes,
+        files: manifest.files.len() + 1,
+        runs: manifest.runs.len(),
+    })
+}
+
+fn contradictions(folder: &Path, manifest: &Manifest) -> Vec<String> {
+    let attempt = || -> Result<Vec<String>, Error> {
+        let mut problems = Vec::new();
+        let study = Study::open(folder)?;
+        let (reference, basis) = (study.reference()?, study.basis()?);
+        if reference.vertices() != basis.vertices() {
+            problems.push(format!("mesh.vtu has {} vertices, the basis {}", reference.vertices(), basis.vertices()));
+        }
+        let rows = study.coefficients(Some(&[1]), Rows::All)?;
+        let mut states = std::collections::BTreeMap::<&str, usize>::new();
+        for run in &rows.runs {
+            *states.entry(run).or_default() += 1;
+        }
+        for (id, run) in &manifest.runs {
+            let found = states.get(id.as_str()).copied().unwrap_or(0);
+            if found != run.times.len() {
+                problems.push(format!("{id}: {found} states in {}, the manifest says {}", run.part, run.times.len()));
+            }
+        }
+        Ok(problems)
+    };
+    attempt().unwrap_or_else(|error| vec![error.to_string()])
+}
+
+fn litter(folder: &Path, manifest: &Manifest) -> Vec<String> {
+    let parts = coefficients::parts_on_disk(folder).unwrap_or_default();
+    let name =
+        |path: &Path| format!("{}/{}", coefficients::FOLDER, path.file_name().unwrap_or_default().to_string_lossy());
+    parts
+        .iter()
+        .map(|path| name(path))
+        .filter(|name| !manifest.files.contains_key(name))
+        .map(|name| format!("{name}: no manifest names it; the next add clears it"))
+        .collect()
+}

@@ -1,0 +1,196 @@
+//! Coefficient parts on disk: Parquet, one row a state, columns so laid that a descriptor reads only its own.
+//!
+//! `run`, `state`, `time`, six measures, then `d1_x`, `d1_y`, `d1_z`, `d2_x`, …: δ of eigenvector j (counted from 1)
+//! in f32. A part is never changed; its name is the hash of its content.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use arrow_array::cast::AsArray;
+use arrow_array::types::{Float32Type, Float64Type, UInt32Type};
+use arrow_array::{ArrayRef, Float32Array, Float64Array, RecordBatch, StringArray, UInt32Array};
+use arrow_schema::{DataType, Field, Schema};
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use parquet::arrow::{ArrowWriter, ProjectionMask};
+use parquet::file::properties::{EnabledStatistics, WriterProperties};
+use parquet::file::reader::ChunkReader;
+
+use super::store;
+use crate::Error;
+use crate::error::io;
+use crate::project::Projected;
+
+/// Folder of the parts in a study.
+pub(crate) const FOLDER: &str = "coefficients";
+const COMPONENTS: [char; 3] = ['x', 'y', 'z'];
+const MEASURES: [&str; 6] = ["rms", "max", "captured", "rigid_share", "strain_median", "strain_p95"];
+
+/// Rows of coefficients, sorted by run and state.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Coefficients {
+    /// Eigenvectors of the columns, counted from 1.
+    pub eigenvectors: Vec<usize>,
+    /// Run id of each row.
+    pub runs: Vec<String>,
+    /// State of each row, counted from 0.
+    pub states: Vec<u32>,
+    /// Time of each row.
+    pub times: Vec<f64>,
+    /// δ, rows × 3|eigenvectors|, row-major: x, y, z of the first eigenvector, then of the next.
+    pub values: Vec<f32>,
+}
+
+impl Coefficients {
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.runs.len()
+    }
+
+    /// δ of one row, 3 |eigenvectors| numbers.
+    pub fn row(&self, row: usize) -> &[f32] {
+        let width = 3 * self.eigenvectors.len();
+        &self.values[row * width..(row + 1) * width]
+    }
+
+    /// Sorts rows by run and state, so that the order in which parts came does not matter.
+    pub(crate) fn sorted(self) -> Self {
+        let mut order: Vec<usize> = (0..self.rows()).collect();
+        order.sort_by(|&a, &b| (&self.runs[a], self.states[a]).cmp(&(&self.runs[b], self.states[b])));
+        Self {
+            runs: order.iter().map(|&row| self.runs[row].clone()).collect(),
+            states: order.iter().map(|&row| self.states[row]).collect(),
+            times: order.iter().map(|&row| self.times[row]).collect(),
+            values: order.iter().flat_map(|&row| self.row(row).iter().copied()).collect(),
+            eigenvectors: self.eigenvectors,
+        }
+    }
+}
+
+/// Writes runs as one part into the study's folder; returns its path below the study.
+pub(crate) fn write_part(folder: &Path, basis: &str, runs: &[Projected]) -> Result<String, Error> {
+    let staged = store::Staged::beside(&folder.join(FOLDER).join("part"));
+    let batch = record_batch(runs)?;
+    let internal = |error: parquet::errors::ParquetError| match error {
+        parquet::errors::ParquetError::External(source) => match source.downcast::<std::io::Error>() {
+            Ok(source) => io("write", folder)(*source),
+            Err(other) => Error::Internal(other.to_string()),
+        },
+        other => {
+            Error::Io { action: "write", path: folder.to_owned(), source: std::io::Error::other(other.to_string()) }
+        }
+    };
+    let mut properties = WriterProperties::builder()
+        .set_statistics_enabled(EnabledStatistics::None)
+        .set_dictionary_enabled(false)
+        .set_column_dictionary_enabled("run".into(), true)
+        .set_created_by(format!("crumple {}", env!("CARGO_PKG_VERSION")));
+    properties = properties.set_key_value_metadata(Some(vec![parquet::file::metadata::KeyValue::new(
+        "crumple.basis".to_owned(),
+        basis.to_owned(),
+    )]));
+    let file = std::fs::File::create(&staged.path).map_err(io("write", folder))?;
+    let mut writer = ArrowWriter::try_new(std::io::BufWriter::new(file), batch.schema(), Some(properties.build()))
+        .map_err(internal)?;
+    writer.write(&batch).map_err(internal)?;
+    let file =
+        writer.into_inner().map_err(internal)?.into_inner().map_err(|error| io("write", folder)(error.into_error()))?;
+    file.sync_all().map_err(io("write", folder))?;
+    let record = super::FileRecord::of(&staged.path)?;
+    let name = format!("{FOLDER}/{}.parquet", &record.blake3[..16]);
+    staged.rename_to(&folder.join(&name))?;
+    Ok(name)
+}
+
+fn record_batch(runs: &[Projected]) -> Result<RecordBatch, Error> {
+    let rows: Vec<(&str, u32, &crate::project::ProjectedState)> = runs
+        .iter()
+        .flat_map(|run| run.states.iter().zip(0..).map(|(state, index)| (run.run.as_str(), index, state)))
+        .collect();
+    let width = rows.first().map_or(0, |(_, _, state)| state.delta.len());
+    let mut fields = vec![
+        Field::new("run", DataType::Utf8, false),
+        Field::new("state", DataType::UInt32, false),
+        Field::new("time", DataType::Float64, false),
+    ];
+    let mut columns: Vec<ArrayRef> = vec![
+        Arc::new(StringArray::from_iter_values(rows.iter().map(|row| row.0))),
+        Arc::new(UInt32Array::from_iter_values(rows.iter().map(|row| row.1))),
+        Arc::new(Float64Array::from_iter_values(rows.iter().map(|row| row.2.time))),
+    ];
+    for (index, name) in MEASURES.iter().enumerate() {
+        fields.push(Field::new(*name, DataType::Float64, false));
+        columns.push(Arc::new(Float64Array::from_iter_values(rows.iter().map(|row| {
+            let m = &row.2.measures;
+            [m.rms, m.max, m.captured, m.rigid_share, m.strain_median, m.strain_p95][index]
+        }))));
+    }
+    for column in 0..width {
+        fields.push(Field::new(column_name(column / 3 + 1, column % 3), DataType::Float32, false));
+        columns.push(Arc::new(Float32Array::from_iter_values(rows.iter().map(|row| row.2.delta[column]))));
+    }
+    RecordBatch::try_new(Arc::new(Schema::new(fields)), columns).map_err(|error| Error::Internal(error.to_string()))
+}
+
+/// Name of the column of an eigenvector (counted from 1) and a component (0, 1, 2).
+pub fn column_name(eigenvector: usize, component: usize) -> String {
+    format!("d{eigenvector}_{}", COMPONENTS[component])
+}
+
+/// Reads the rows of a part that `keep` accepts (by run and state), only the columns of the named eigenvectors, and
+/// appends them to `into`, whose `eigenvectors` say which.
+pub(crate) fn read_part<R: ChunkReader + 'static>(
+    source: R,
+    path: &Path,
+    keep: &dyn Fn(&str, u32) -> bool,
+    into: &mut Coefficients,
+) -> Result<(), Error> {
+    let damaged = |what: String| Error::Damaged { path: path.to_owned(), what };
+    let builder = ParquetRecordBatchReaderBuilder::try_new(source).map_err(|error| damaged(error.to_string()))?;
+    let names = ["run", "state", "time"].map(str::to_owned).into_iter();
+    let names: Vec<String> =
+        names.chain(into.eigenvectors.iter().flat_map(|&j| (0..3).map(move |c| column_name(j, c)))).collect();
+    let schema = builder.parquet_schema();
+    let by_name: std::collections::HashMap<&str, usize> =
+        schema.columns().iter().zip(0..).map(|(column, leaf)| (column.name(), leaf)).collect();
+    let leaves: Vec<usize> = names
+        .iter()
+        .map(|name| by_name.get(name.as_str()).copied().ok_or_else(|| damaged(format!("no column '{name}'"))))
+        .collect::<Result<_, _>>()?;
+    let mask = ProjectionMask::leaves(schema, leaves);
+    let reader = builder.with_projection(mask).build().map_err(|error| damaged(error.to_string()))?;
+    for batch in reader {
+        let batch = batch.map_err(|error| damaged(error.to_string()))?;
+        let column = |name: &str| batch.column_by_name(name).ok_or_else(|| damaged(format!("no column '{name}'")));
+        let wrong = |name: &str| damaged(format!("column '{name}' has another type than expected"));
+        let runs = column("run")?.as_string_opt::<i32>().ok_or_else(|| wrong("run"))?;
+        let states = column("state")?.as_primitive_opt::<UInt32Type>().ok_or_else(|| wrong("state"))?.values();
+        let times = column("time")?.as_primitive_opt::<Float64Type>().ok_or_else(|| wrong("time"))?.values();
+        let values: Vec<&[f32]> = names[3..]
+            .iter()
+            .map(|name| {
+                Ok::<_, Error>(
+                    &column(name)?.as_primitive_opt::<Float32Type>().ok_or_else(|| wrong(name))?.values()[..],
+                )
+            })
+            .collect::<Result<_, _>>()?;
+        for row in (0..batch.num_rows()).filter(|&row| keep(runs.value(row), states[row])) {
+            into.runs.push(runs.value(row).to_owned());
+            into.states.push(states[row]);
+            into.times.push(times[row]);
+            into.values.extend(values.iter().map(|column| column[row]));
+        }
+    }
+    Ok(())
+}
+
+/// Paths of the parts on disk, whether the manifest names them or not.
+pub(crate) fn parts_on_disk(folder: &Path) -> Result<Vec<PathBuf>, Error> {
+    let parts = folder.join(FOLDER);
+    let entries = std::fs::read_dir(&parts).map_err(io("read the folder", &parts))?;
+    let mut paths: Vec<PathBuf> = entries
+        .map(|entry| entry.map(|entry| entry.path()).map_err(io("read the folder", &parts)))
+        .collect::<Result<_, _>>()?;
+    paths.retain(|path| path.is_file() && path.file_name().is_some_and(|name| name != super::WRITERS));
+    paths.sort();
+    Ok(paths)
+}

@@ -1,0 +1,366 @@
+//! The study on disk: a folder that other tools open, and that is whole at every moment.
+//!
+//! ```text
+//! study/
+//!   study.toml              what was asked: reference, parts, K, join, units
+//!   manifest.json           what is in it: files with checksums, a record a run; replaced by rename, last
+//!   mesh.vtu                the reference mesh
+//!   basis.safetensors       eigenvalues, eigenvectors, mass, baseline
+//!   coefficients/*.parquet  immutable parts, named by content
+//!   runs.parquet            one row a run: the manifest's records as a table, renewed after the manifest
+//!   modes.parquet           the last answer of `modes`
+//!   descriptors/*.json      descriptors
+//! ```
+//!
+//! A part becomes part of the study when the manifest that names it replaces the old one; a crash before that leaves
+//! litter, which the next writer clears once no other writer is alive. Writers take turns at the manifest by a lock
+//! and merge what they find there, so two processes that add at once lose nothing.
+
+mod add;
+mod basis_file;
+mod check;
+mod coefficients;
+mod manifest;
+mod mesh_file;
+pub(crate) mod store;
+mod tables;
+
+use std::path::{Path, PathBuf};
+
+use mesh_spectrum::Watch;
+use serde::{Deserialize, Serialize};
+
+pub use add::{AddOptions, Added};
+pub use check::{Checkup, check};
+pub use coefficients::{Coefficients, column_name};
+pub use manifest::{FileRecord, LAYOUT, Manifest, RunRecord};
+pub use mesh_file::write_shape;
+pub use tables::write_columns;
+pub(crate) use tables::{Column, metadata_of};
+
+use crate::Error;
+use crate::basis::{Basis, BasisOptions};
+use crate::error::io;
+use crate::reference::Reference;
+use crate::run::Run;
+
+const SETTINGS: &str = "study.toml";
+/// Lock that serialises changes of the manifest.
+const LOCK: &str = ".lock";
+/// Lock that writers share while they have parts which no manifest names yet.
+const WRITERS: &str = ".writers";
+/// Folder of the descriptors.
+pub(crate) const DESCRIPTORS: &str = "descriptors";
+
+/// What was asked for when the study was made.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Settings {
+    /// Id of the reference run.
+    pub reference: String,
+    /// Path of its root file.
+    pub reference_path: PathBuf,
+    /// Labels of the parts whose shells make the surface.
+    pub parts: Vec<String>,
+    /// Eigenpairs asked for.
+    pub eigenpairs: usize,
+    /// Distance of the join; absent when components stay apart.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub join: Option<f64>,
+    /// The operator.
+    pub operator: String,
+    /// The mass matrix.
+    pub mass: String,
+    /// Unit of lengths: a label, nothing is converted.
+    pub length_unit: String,
+    /// Unit of times: a label, nothing is converted.
+    pub time_unit: String,
+}
+
+/// A study with its mesh and basis in memory: what most questions need.
+#[derive(Debug)]
+pub struct Loaded {
+    /// The study.
+    pub study: Study,
+    /// Its reference mesh.
+    pub reference: Reference,
+    /// Its eigenbasis.
+    pub basis: Basis,
+}
+
+impl Loaded {
+    /// Opens a study and reads mesh and basis.
+    ///
+    /// # Errors
+    /// As [`Study::open`], [`Study::reference`], [`Study::basis`].
+    pub fn open(folder: &Path) -> Result<Self, Error> {
+        Self::of(Study::open(folder)?)
+    }
+
+    /// Reads mesh and basis of a study.
+    ///
+    /// # Errors
+    /// As [`Study::reference`], [`Study::basis`].
+    pub fn of(study: Study) -> Result<Self, Error> {
+        let (reference, basis) = (study.reference()?, study.basis()?);
+        Ok(Self { study, reference, basis })
+    }
+}
+
+/// Which rows of the coefficients are wanted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Rows<'a> {
+    /// The last state of every run.
+    Last,
+    /// Every state of every run.
+    All,
+    /// Every state of one run.
+    Run(&'a str),
+}
+
+/// An opened study.
+#[derive(Debug)]
+pub struct Study {
+    folder: PathBuf,
+    settings: Settings,
+    manifest: Manifest,
+}
+
+impl Study {
+    /// Makes a study: reference mesh, operator, eigenbasis. The folder appears when everything is in it.
+    ///
+    /// # Errors
+    /// [`Error::StudyExists`] if there is anything at `folder`, and everything that [`Reference::of_run`] and
+    /// [`Basis::compute`] return.
+    pub fn create(
+        folder: &Path,
+        run: &Run,
+        parts: &[String],
+        options: &BasisOptions,
+        watch: &dyn Watch,
+    ) -> Result<Self, Error> {
+        if folder.exists() && !is_empty_folder(folder) {
+            let what = if folder.join(manifest::FILE).exists() {
+                "a study is here already"
+            } else {
+                "something is here already"
+            };
+            return Err(Error::StudyExists { folder: folder.to_owned(), what: what.into() });
+        }
+        let staged = StagedFolder::beside(folder)?;
+        let reference = Reference::of_run(run, parts)?;
+        let mut basis = Basis::compute(&reference, options, watch)?;
+        let settings = Settings {
+            reference: run.id().to_owned(),
+            reference_path: absolute(run.path()),
+            parts: reference.parts.clone(),
+            eigenpairs: options.eigenpairs,
+            join: options.join,
+            operator: "cotangent".into(),
+            mass: "lumped".into(),
+            length_unit: "mm".into(),
+            time_unit: "ms".into(),
+        };
+        let text = toml::to_string_pretty(&settings).map_err(|error| Error::Internal(error.to_string()))?;
+        store::write_bytes(&staged.path.join(SETTINGS), text.as_bytes())?;
+        mesh_file::write(&reference, &staged.path.join(mesh_file::FILE))?;
+        basis_file::write(&basis, &staged.path.join(basis_file::FILE))?;
+        for name in [coefficients::FOLDER, DESCRIPTORS] {
+            let path = staged.path.join(name);
+            std::fs::create_dir(&path).map_err(io("make the folder", &path))?;
+        }
+        let files = [SETTINGS, mesh_file::FILE, basis_file::FILE]
+            .into_iter()
+            .map(|name| Ok((name.to_owned(), FileRecord::of(&staged.path.join(name))?)))
+            .collect::<Result<std::collections::BTreeMap<_, _>, Error>>()?;
+        basis.id = files[basis_file::FILE].blake3[..16].to_owned();
+        let manifest = Manifest {
+            layout: LAYOUT,
+            crumple: env!("CARGO_PKG_VERSION").into(),
+            basis: basis.id,
+            files,
+            inputs: Vec::new(),
+            runs: Default::default(),
+        };
+        manifest.write(&staged.path)?;
+        tables::write_runs(&staged.path, &manifest)?;
+        staged.rename_to(folder)?;
+        Ok(Self { folder: folder.to_owned(), settings, manifest })
+    }
+
+    /// Opens a study: reads its manifest and settings, nothing else.
+    ///
+    /// # Errors
+    /// [`Error::NotAStudy`], [`Error::OtherLayout`], [`Error::Damaged`].
+    pub fn open(folder: &Path) -> Result<Self, Error> {
+        let manifest = Manifest::read(folder)?;
+        let path = folder.join(SETTINGS);
+        let text = std::fs::read_to_string(&path).map_err(io("read", &path))?;
+        let settings = toml::from_str(&text).map_err(|error| Error::Damaged { path, what: error.to_string() })?;
+        Ok(Self { folder: folder.to_owned(), settings, manifest })
+    }
+
+    /// The folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// What was asked for.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// What is in it.
+    pub fn manifest(&self) -> &Manifest {
+        &self.manifest
+    }
+
+    /// Whether the study answers to these wishes: the same reference file, parts, eigenpairs and join.
+    pub fn is_for(&self, run: &Run, parts: &[String], options: &BasisOptions) -> Result<bool, Error> {
+        let reference = Reference::of_run(run, parts)?;
+        let same_mesh = || -> Result<bool, Error> {
+            let here = self.reference()?;
+            Ok(here.node_ids == reference.node_ids
+                && here.mesh.triangles() == reference.mesh.triangles()
+                && here.mesh.vertices() == reference.mesh.vertices())
+        };
+        Ok(self.settings.eigenpairs == options.eigenpairs
+            && self.settings.join == options.join
+            && self.settings.parts == reference.parts
+            && same_mesh()?)
+    }
+
+    /// The reference mesh.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Damaged`].
+    pub fn reference(&self) -> Result<Reference, Error> {
+        mesh_file::read(&self.folder.join(mesh_file::FILE), self.settings.parts.clone())
+    }
+
+    /// The eigenbasis.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Damaged`].
+    pub fn basis(&self) -> Result<Basis, Error> {
+        basis_file::read(&self.folder.join(basis_file::FILE), &self.manifest.basis)
+    }
+
+    /// Coefficients δ of the named eigenvectors (counted from 1; all K when `None`). Only their columns are read.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Damaged`].
+    pub fn coefficients(&self, eigenvectors: Option<&[usize]>, rows: Rows<'_>) -> Result<Coefficients, Error> {
+        let all: Vec<usize>;
+        let eigenvectors = match eigenvectors {
+            Some(eigenvectors) => eigenvectors,
+            None => {
+                all = (1..=self.basis()?.eigenpairs()).collect();
+                &all
+            }
+        };
+        let mut result = Coefficients { eigenvectors: eigenvectors.to_vec(), ..Default::default() };
+        let parts: std::collections::BTreeSet<&str> = self
+            .manifest
+            .runs
+            .iter()
+            .filter(|(id, _)| !matches!(rows, Rows::Run(run) if run != id.as_str()))
+            .map(|(_, run)| run.part.as_str())
+            .collect();
+        for part in parts {
+            // A run that was replaced has rows in an old part too; only the part that the manifest names counts.
+            let keep = |run: &str, state: u32| {
+                self.manifest.runs.get(run).is_some_and(|record| {
+                    record.part == part
+                        && match rows {
+                            Rows::Last => state as usize + 1 == record.times.len(),
+                            Rows::All => true,
+                            Rows::Run(wanted) => run == wanted,
+                        }
+                })
+            };
+            let path = self.folder.join(part);
+            let file = std::fs::File::open(&path).map_err(io("read", &path))?;
+            coefficients::read_part(file, &path, &keep, &mut result)?;
+        }
+        Ok(result.sorted())
+    }
+
+    /// The record of a run of the study.
+    ///
+    /// # Errors
+    /// [`Error::UnknownRun`] with ids that look like it.
+    pub fn record(&self, run: &str) -> Result<&RunRecord, Error> {
+        self.manifest.runs.get(run).ok_or_else(|| {
+            let needle: String = run.chars().filter(char::is_ascii_digit).collect();
+            let like = |id: &&String| id.contains(run) || (!needle.is_empty() && id.contains(&needle));
+            Error::UnknownRun {
+                asked: run.to_owned(),
+                near: self.manifest.runs.keys().filter(like).take(5).cloned().collect(),
+            }
+        })
+    }
+
+    /// Opens the result file of a run of the study and reads one state of it on the mesh, N × 3.
+    ///
+    /// # Errors
+    /// [`Error::UnknownRun`], [`Error::UnknownState`], reading errors.
+    pub fn shape(&self, reference: &Reference, run: &str, state: usize) -> Result<Vec<[f64; 3]>, Error> {
+        let record = self.record(run)?;
+        let opened = Run::open(run, &record.path)?;
+        if state >= opened.times().len() {
+            return Err(Error::UnknownState {
+                run: run.to_owned(),
+                state: state.to_string(),
+                states: opened.times().len(),
+            });
+        }
+        reference.shape(&opened, &reference.place(&opened)?, state)
+    }
+
+    /// Takes up what another process, or this one, has committed since.
+    ///
+    /// # Errors
+    /// As [`Study::open`].
+    pub fn refresh(&mut self) -> Result<(), Error> {
+        self.manifest = Manifest::read(&self.folder)?;
+        Ok(())
+    }
+}
+
+pub(crate) fn absolute(path: &Path) -> PathBuf {
+    path.canonicalize().unwrap_or_else(|_| path.to_owned())
+}
+
+fn is_empty_folder(path: &Path) -> bool {
+    std::fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none())
+}
+
+/// A folder that is being filled under a temporary name, removed unless it was renamed.
+struct StagedFolder {
+    path: PathBuf,
+}
+
+impl StagedFolder {
+    fn beside(folder: &Path) -> Result<Self, Error> {
+        let parent = folder.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        std::fs::create_dir_all(parent).map_err(io("make the folder", parent))?;
+        let path = store::Staged::beside(folder);
+        std::fs::create_dir(&path.path).map_err(io("make the folder", folder))?;
+        let staged = Self { path: path.path.clone() };
+        std::mem::forget(path);
+        Ok(staged)
+    }
+
+    fn rename_to(self, folder: &Path) -> Result<(), Error> {
+        std::fs::rename(&self.path, folder).map_err(io("write", folder))?;
+        std::mem::forget(self);
+        Ok(())
+    }
+}
+
+impl Drop for StagedFolder {
+    fn drop(&mut self) {
+        // The failure that led here is what the user hears of.
+        let _ = std::fs::remove_dir_all(&self.path);
+    }
+}

@@ -1,0 +1,274 @@
+//! A family opened: header, geometry, parts, and the place of every state.
+
+use std::path::{Path, PathBuf};
+
+use crate::control::{Control, Header};
+use crate::detect::{self, FileType};
+use crate::elements::Geometry;
+use crate::error::Error;
+use crate::geometry::{Reading, read_geometry};
+use crate::members::{Stream, member_number};
+use crate::parts::{Part, assemble};
+use crate::rigid::uncertain_rigid_bodies;
+use crate::roots::roots;
+use crate::state::{Field, Layout, Variant};
+use crate::titles::{Titles, read_titles};
+use crate::walk::{Walk, Walker};
+use crate::warning::Warning;
+use crate::words::decode_text;
+
+/// An opened family: header and geometry are known, states are located, nothing of the states has been read but their
+/// times. Results of a state are read when they are asked for, and only the bytes they need.
+///
+/// ```
+/// use d3plot::{Family, Layers};
+///
+/// let root = concat!(env!("CARGO_MANIFEST_DIR"), "/testdata/s01_shells_latin1/d3plot");
+/// let family = Family::open(root.as_ref())?;
+/// assert_eq!(family.geometry().shells.len(), 35);
+/// assert_eq!(family.parts()[0].title, "Längsträger vorn");
+///
+/// let last = family.times().len() - 1;
+/// let positions = family.coordinates(last)?.expect("this family holds coordinates");
+/// let strain = family.shell_plastic_strain(last, Layers::Max)?.expect("and plastic strain");
+/// assert_eq!((positions.len(), strain.len()), (family.header().nodes, family.header().shells));
+/// # Ok::<(), d3plot::Error>(())
+/// ```
+#[derive(Debug)]
+pub struct Family {
+    pub(crate) stream: Stream,
+    pub(crate) control: Control,
+    pub(crate) reading: Reading,
+    pub(crate) layout: Layout,
+    /// Byte of the stream at which each state starts.
+    pub(crate) starts: Vec<u64>,
+    header: Header,
+    parts: Vec<Part>,
+    times: Vec<f64>,
+    members: Vec<Member>,
+    warnings: Vec<Warning>,
+}
+
+/// A file of the family.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Member {
+    /// The file.
+    pub path: PathBuf,
+    /// Its size.
+    pub bytes: u64,
+    /// Whole states that start in it.
+    pub states: usize,
+}
+
+impl Family {
+    /// Opens the family of a root file, or the one family of a folder: the only one, or the only d3plot beside a
+    /// d3part, d3drlf or d3eigv.
+    ///
+    /// A run that was killed, members that are missing and titles that are cut cost only themselves:
+    /// see [`Family::warnings`].
+    ///
+    /// # Errors
+    /// Any [`Error`] but [`Error::NoSuchState`] and [`Error::Layer`]: what is there is not a family, or its control
+    /// block or geometry cannot be read with certainty.
+    pub fn open(path: &Path) -> Result<Family, Error> {
+        let data = std::fs::metadata(path).map_err(Error::io(path, "looking at it"))?;
+        if data.is_dir() { Family::open_root(&only_root(path)?) } else { Family::open_root(path) }
+    }
+
+    fn open_root(root: &Path) -> Result<Family, Error> {
+        let mut warnings = Vec::new();
+        let stream = Stream::find(root, &mut warnings)?;
+        let control = Control::read(&stream).map_err(|error| state_file(root, error))?;
+        let mut reading = read_geometry(&control, &stream)?;
+        if !reading.numbers_agree {
+            warnings.push(Warning::UserNumbers { path: root.to_owned() });
+        }
+        let titles = read_titles(&control, &stream, &reading, &mut warnings)?;
+        let parts = assemble(&control, &mut reading, &titles, &mut warnings);
+        if let Some(active) = &reading.active {
+            warnings.push(Warning::RigidNodes { count: control.nodes.saturating_sub(active.len() as u64) });
+        }
+        let (layout, walk) = locate(&control, &stream, &reading, &titles, &mut warnings)?;
+        let Walk { starts, times, .. } = walk;
+        if starts.is_empty() {
+            warnings.push(Warning::NoStates);
+        }
+        let mut members: Vec<Member> = stream
+            .members()
+            .iter()
+            .map(|member| Member { path: member.path.clone(), bytes: member.bytes, states: 0 })
+            .collect();
+        for &start in &starts {
+            members[stream.member_at(start)].states += 1;
+        }
+        let header = header(&control, &titles, &layout);
+        Ok(Family { stream, control, reading, layout, starts, header, parts, times, members, warnings })
+    }
+
+    /// The root file.
+    pub fn root(&self) -> &Path {
+        self.stream.root()
+    }
+
+    /// What the control block says.
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// The mesh before the first state.
+    pub fn geometry(&self) -> &Geometry {
+        &self.reading.geometry
+    }
+
+    /// The parts in internal order, those without elements too. Elements name them by index.
+    pub fn parts(&self) -> &[Part] {
+        &self.parts
+    }
+
+    /// Times of the whole states, in the file's time unit, never decreasing.
+    pub fn times(&self) -> &[f64] {
+        &self.times
+    }
+
+    /// The files in order, the root first.
+    pub fn members(&self) -> &[Member] {
+        &self.members
+    }
+
+    /// What is missing or odd although the family was read.
+    pub fn warnings(&self) -> &[Warning] {
+        &self.warnings
+    }
+
+    /// The tables that every state holds, in the order of the file, and behind them what is computed out of them:
+    /// `coordinates` (where the file has `displacement`), `shell_plastic_strain`, `solid_plastic_strain`,
+    /// `thick_shell_plastic_strain` (columns: points an element).
+    pub fn fields(&self) -> Vec<Field> {
+        let mut fields = self.layout.fields.clone();
+        if let Some(displacement) = self.layout.field("displacement") {
+            fields.push(Field { name: "coordinates", ..displacement.clone() });
+        }
+        fields.extend(self.strain_fields());
+        fields
+    }
+}
+
+/// The root that a folder stands for.
+fn only_root(folder: &Path) -> Result<PathBuf, Error> {
+    let found = roots(folder)?;
+    let d3plots: Vec<PathBuf> =
+        found.families.iter().filter(|root| root.file_type == FileType::D3plot).map(|root| root.path.clone()).collect();
+    let all: Vec<PathBuf> = found.families.iter().map(|root| root.path.clone()).collect();
+    let mut refused = found.refused;
+    match (all.as_slice(), d3plots.as_slice()) {
+        ([only], _) | (_, [only]) => Ok(only.clone()),
+        // one file that cannot be read says more by its own error
+        ([], _) if refused.len() == 1 => Err(refused.remove(0).error),
+        ([], _) => Err(Error::NoFamily {
+            folder: folder.to_owned(),
+            refused: refused.into_iter().map(|refused| refused.path).collect(),
+        }),
+        _ => Err(Error::SeveralFamilies { folder: folder.to_owned(), roots: all }),
+    }
+}
+
+/// A file without control block whose name ends in digits may be a member of a family beside it: say so.
+fn state_file(path: &Path, error: Error) -> Error {
+    let file_name = path.file_name().unwrap_or_default().as_encoded_bytes();
+    let digits = file_name.iter().rev().take_while(|byte| byte.is_ascii_digit()).count();
+    if !matches!(error, Error::NotD3plot { .. }) || digits < 2 {
+        return error;
+    }
+    for count in 2..=digits {
+        let (name, number) = file_name.split_at(file_name.len() - count);
+        let Ok(name) = std::str::from_utf8(name) else {
+            break;
+        };
+        let root = path.with_file_name(name);
+        let bytes = std::fs::metadata(&root).map_or(0, |data| data.len());
+        if member_number(number).is_some() && detect::is_root(&root, bytes) {
+            return Error::NotRoot { path: path.to_owned(), root };
+        }
+    }
+    error
+}
+
+/// Finds the states. If the end marks contradict the layout by the manual, the alternatives are tried and the one that
+/// fits is taken; if none does, the manual's stands and the warnings of its walk tell what was not read.
+fn locate(
+    control: &Control,
+    stream: &Stream,
+    reading: &Reading,
+    titles: &Titles,
+    warnings: &mut Vec<Warning>,
+) -> Result<(Layout, Walk), Error> {
+    let manual = Variant::by_the_manual(control, reading);
+    let too_long =
+        || Error::Unsupported { path: stream.root().to_owned(), what: "a state of more than 2⁶⁴ bytes".to_owned() };
+    let declared = manual.layout(control, reading).ok_or_else(too_long)?;
+    let mut walker = Walker::new(stream, control.words, titles.states_from, control.iu == 0);
+    let walk = walker.walk(declared.words)?;
+    let mut best: Option<(Layout, Walk, String)> = None;
+    if walk.doubtful > 0 {
+        for (variant, reason) in manual.alternatives(reading) {
+            let Some(layout) = variant.layout(control, reading).filter(|layout| layout.words != declared.words) else {
+                continue;
+            };
+            if let Some((_, _, reasons)) = best.as_mut().filter(|(best, ..)| best.words == layout.words) {
+                // the marks cannot tell these apart; what stands behind the words in doubt is right in both
+                if !reason.contains(',') {
+                    *reasons = format!("{reasons} or {reason}");
+                }
+                continue;
+            }
+            let other = walker.walk(layout.words)?;
+            if other.fits_better_than(best.as_ref().map_or(&walk, |(_, walk, _)| walk)) {
+                best = Some((layout, other, reason));
+            }
+        }
+    }
+    let (layout, mut walk) = match best {
+        Some((layout, walk, reason)) => {
+            warnings.push(Warning::StateSize { declared: declared.words, used: layout.words, reason });
+            (layout, walk)
+        }
+        None => (declared, walk),
+    };
+    if reading.rigid_bodies > 0 && (walk.doubtful > 0 || walk.confirmed == 0) {
+        return Err(uncertain_rigid_bodies(control, stream));
+    }
+    let unread = |warning: &Warning| matches!(warning, Warning::UnreadTail { .. });
+    if control.reduced && walk.confirmed == 0 && walk.warnings.iter().any(unread) {
+        let what = format!(
+            "reduced output (INUM < 0) whose states do not end every {} words, as the control block has it",
+            layout.words
+        );
+        return Err(Error::Unsupported { path: stream.root().to_owned(), what });
+    }
+    warnings.append(&mut walk.warnings);
+    Ok((layout, walk))
+}
+
+fn header(control: &Control, titles: &Titles, layout: &Layout) -> Header {
+    let title = decode_text(&control.title);
+    let long = titles.head.as_deref().map(decode_text).filter(|head| head.len() > title.len());
+    Header {
+        title: long.unwrap_or(title),
+        precision: control.words.precision,
+        byte_order: control.words.order,
+        file_type: control.file_type,
+        release: control.release.clone(),
+        run_time: control.run_time,
+        nodes: control.nodes as usize,
+        solids: control.solids as usize,
+        thick_shells: control.thick_shells as usize,
+        beams: control.beams as usize,
+        shells: control.shells as usize,
+        rigid_shells: layout.rigid_shells as usize,
+        sph: control.sph as usize,
+        parts: control.parts as usize,
+        layers: control.layers as usize,
+        words_per_state: layout.words,
+    }
+}

@@ -1,0 +1,243 @@
+//! The files of a family, seen as one stream of bytes: root, root01, root02 … one after the other.
+//!
+//! A section or a state that is longer than a member runs on into the next one, so everything above this room
+//! counts bytes from the start of the root. Reads are positioned and bounded by the sizes seen at opening.
+
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use crate::detect;
+use crate::error::Error;
+use crate::warning::Warning;
+
+/// One file of the family.
+#[derive(Debug, Clone)]
+pub(crate) struct MemberFile {
+    pub(crate) path: PathBuf,
+    /// Its number, 0 for the root.
+    pub(crate) number: u32,
+    /// Where it starts in the stream.
+    pub(crate) start: u64,
+    pub(crate) bytes: u64,
+}
+
+impl MemberFile {
+    pub(crate) fn end(&self) -> u64 {
+        self.start + self.bytes
+    }
+}
+
+/// The members of a family in order, and the file read last, kept open.
+#[derive(Debug)]
+pub(crate) struct Stream {
+    members: Vec<MemberFile>,
+    latest: Mutex<Option<(usize, Arc<File>)>>,
+}
+
+impl Stream {
+    /// Finds the members of the family of `root` in its folder: names are compared as strings of bytes, so that no
+    /// character of a name means anything.
+    pub(crate) fn find(root: &Path, warnings: &mut Vec<Warning>) -> Result<Stream, Error> {
+        let bytes = fs::metadata(root).map_err(Error::io(root, "looking at it"))?.len();
+        let mut found = vec![(0, root.to_owned(), bytes)];
+        let mut levels = Vec::new();
+        let root_name = root.file_name().unwrap_or_default().as_encoded_bytes();
+        // the base of a level of an adaptive mesh: d3plot beside d3plotaa
+        let is_base = |name: &[u8]| root_name.strip_prefix(name).is_some_and(is_level);
+        let is_kin = |name: &[u8]| {
+            is_base(name)
+                || name
+                    .strip_prefix(root_name)
+                    .is_some_and(|suffix| is_level(suffix) || member_number(suffix).is_some())
+        };
+        for (path, bytes) in files_in(folder_of(root), is_kin)? {
+            let file_name = path.file_name().unwrap_or_default().as_encoded_bytes();
+            let number = file_name.strip_prefix(root_name).and_then(member_number);
+            // the folder as the caller wrote it
+            let path = root.with_file_name(path.file_name().unwrap_or_default());
+            match (number, detect::is_surely_root(&path, bytes)) {
+                (Some(number), false) => found.push((number, path, bytes)),
+                (Some(_), true) => warnings.push(Warning::AnotherRoot { path }),
+                (None, true) => levels.push(path),
+                (None, false) => {}
+            }
+        }
+        // d3plot01 and d3plot001 have one number: the shorter name is the solver's
+        found.sort_by(|a, b| (a.0, a.1.as_os_str().len(), &a.1).cmp(&(b.0, b.1.as_os_str().len(), &b.1)));
+        found.dedup_by_key(|member| member.0);
+        if !levels.is_empty() {
+            levels.sort();
+            warnings.push(Warning::AdaptiveLevels { levels });
+        }
+        let mut members: Vec<MemberFile> = Vec::with_capacity(found.len());
+        for (number, path, bytes) in found {
+            let start = members.last().map_or(0, MemberFile::end);
+            if let Some(last) = members.last().filter(|last| number > last.number + 1) {
+                let count = number - last.number - 1;
+                warnings.push(Warning::MissingMembers { after: last.path.clone(), before: path.clone(), count });
+            }
+            members.push(MemberFile { path, number, start, bytes });
+        }
+        Ok(Stream { members, latest: Mutex::new(None) })
+    }
+
+    pub(crate) fn members(&self) -> &[MemberFile] {
+        &self.members
+    }
+
+    pub(crate) fn root(&self) -> &Path {
+        &self.members[0].path
+    }
+
+    /// Bytes of all members together.
+    pub(crate) fn total(&self) -> u64 {
+        self.members.last().map_or(0, MemberFile::end)
+    }
+
+    /// Index of the member that holds byte `at` of the stream; the last one for a byte behind the end.
+    pub(crate) fn member_at(&self, at: u64) -> usize {
+        self.members.partition_point(|member| member.end() <= at).min(self.members.len() - 1)
+    }
+
+    /// Path of the member that holds byte `at`, and the byte's place in it: for messages.
+    pub(crate) fn place(&self, at: u64) -> (PathBuf, u64) {
+        let member = &self.members[self.member_at(at)];
+        (member.path.clone(), at - member.start)
+    }
+
+    /// Byte to which a section that starts in member `first` may reach. It runs on only out of members that are a whole
+    /// number of 512-word blocks, all of one length but the last, and numbered without a gap: words of another member
+    /// must not complete a file that was cut.
+    pub(crate) fn run_on_limit(&self, first: usize, word_size: u64) -> u64 {
+        let full = self.members[0].bytes;
+        let mut limit = self.members[first].end();
+        if !full.is_multiple_of(512 * word_size) {
+            return limit;
+        }
+        for pair in self.members[first..].windows(2) {
+            if pair[0].bytes != full || pair[1].number != pair[0].number + 1 {
+                break;
+            }
+            limit = pair[1].end();
+        }
+        limit
+    }
+
+    /// `count` bytes from byte `at` on. Nothing is allocated before the members are known to hold them.
+    pub(crate) fn read(&self, at: u64, count: u64) -> Result<Vec<u8>, Error> {
+        let fits = at.checked_add(count).is_some_and(|end| end <= self.total());
+        let Some(length) = usize::try_from(count).ok().filter(|_| fits) else {
+            let (path, offset) = self.place(at);
+            let left = self.total().saturating_sub(at);
+            return Err(Error::Truncated { path, section: "data", offset, need: count, left });
+        };
+        let mut bytes = vec![0; length];
+        let mut filled = 0;
+        while filled < length {
+            let from = at + filled as u64;
+            let index = self.member_at(from);
+            let member = &self.members[index];
+            let here = (member.end() - from).min((length - filled) as u64) as usize;
+            self.read_member(index, from - member.start, &mut bytes[filled..filled + here])?;
+            filled += here;
+        }
+        Ok(bytes)
+    }
+
+    fn read_member(&self, index: usize, offset: u64, into: &mut [u8]) -> Result<(), Error> {
+        let member = &self.members[index];
+        let file = self.open(index)?;
+        let mut filled = 0;
+        while filled < into.len() {
+            match read_at(&file, &mut into[filled..], offset + filled as u64) {
+                Ok(0) => {
+                    let found = offset + filled as u64;
+                    return Err(Error::Changed { path: member.path.clone(), expected: member.bytes, found });
+                }
+                Ok(count) => filled += count,
+                Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(Error::io(&member.path, "reading")(error)),
+            }
+        }
+        Ok(())
+    }
+
+    /// Only the file read last stays open: families of a thousand members would use up the file handles.
+    fn open(&self, index: usize) -> Result<Arc<File>, Error> {
+        let mut latest = self.latest.lock().unwrap_or_else(PoisonError::into_inner);
+        match &*latest {
+            Some((open, file)) if *open == index => Ok(Arc::clone(file)),
+            _ => {
+                let path = &self.members[index].path;
+                let file = Arc::new(File::open(path).map_err(Error::io(path, "opening"))?);
+                *latest = Some((index, Arc::clone(&file)));
+                Ok(file)
+            }
+        }
+    }
+}
+
+#[cfg(unix)]
+fn read_at(file: &File, into: &mut [u8], offset: u64) -> std::io::Result<usize> {
+    std::os::unix::fs::FileExt::read_at(file, into, offset)
+}
+
+#[cfg(windows)]
+fn read_at(file: &File, into: &mut [u8], offset: u64) -> std::io::Result<usize> {
+    std::os::windows::fs::FileExt::seek_read(file, into, offset)
+}
+
+/// Elsewhere a handle has one position that all its users share: one reader at a time.
+#[cfg(not(any(unix, windows)))]
+fn read_at(mut file: &File, into: &mut [u8], offset: u64) -> std::io::Result<usize> {
+    use std::io::{Read, Seek, SeekFrom};
+    static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+    let _guard = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
+    file.seek(SeekFrom::Start(offset))?;
+    file.read(into)
+}
+
+/// The first bytes of a file, at most `count`.
+pub(crate) fn read_head(path: &Path, count: u64) -> Result<Vec<u8>, Error> {
+    use std::io::Read;
+    let file = File::open(path).map_err(Error::io(path, "opening"))?;
+    let mut head = Vec::new();
+    file.take(count).read_to_end(&mut head).map_err(Error::io(path, "reading"))?;
+    Ok(head)
+}
+
+/// The ordinary files of a folder whose name is `wanted`, with their sizes, sorted by name.
+pub(crate) fn files_in(folder: &Path, wanted: impl Fn(&[u8]) -> bool) -> Result<Vec<(PathBuf, u64)>, Error> {
+    let mut files = Vec::new();
+    for entry in fs::read_dir(folder).map_err(Error::io(folder, "listing the folder"))? {
+        let entry = entry.map_err(Error::io(folder, "listing the folder"))?;
+        if !wanted(entry.file_name().as_encoded_bytes()) {
+            continue;
+        }
+        let path = entry.path();
+        // a link that leads nowhere is not a file of the family
+        if let Some(data) = fs::metadata(&path).ok().filter(fs::Metadata::is_file) {
+            files.push((path, data.len()));
+        }
+    }
+    files.sort();
+    Ok(files)
+}
+
+/// The folder of a file, for listing.
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// The number behind the root's name: two digits or more.
+pub(crate) fn member_number(suffix: &[u8]) -> Option<u32> {
+    let digits = (2..=6).contains(&suffix.len()) && suffix.iter().all(u8::is_ascii_digit);
+    let number = std::str::from_utf8(suffix).ok().filter(|_| digits)?.parse().ok()?;
+    (number > 0).then_some(number)
+}
+
+/// Whether a suffix is that of an adaptive level: two letters, `aa` to `zz`.
+pub(crate) fn is_level(suffix: &[u8]) -> bool {
+    suffix.len() == 2 && suffix.iter().all(u8::is_ascii_lowercase)
+}

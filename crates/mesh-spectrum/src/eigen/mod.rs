@@ -1,0 +1,256 @@
+//! The lowest eigenpairs of L φ = λ M φ, with the evidence that they are right and that none is missing.
+//!
+//! In the order of the work: `component` (mass scaled out, one connected component at a time), `factor` (L D Lᵀ and
+//! inertia), `solve` (its solves), `block` (dense products), `lanczos` (one shift), `slice` (the pairs around it),
+//! `assemble` (slices to a spectrum), `spectrum` (how far each component's must go), `finish` (orthogonality, residuals),
+//! `basis` (the merge of all components, on vertices).
+
+mod assemble;
+mod basis;
+pub(crate) mod block;
+mod component;
+mod factor;
+mod finish;
+mod lanczos;
+mod slice;
+pub(crate) mod solve;
+mod spectrum;
+mod weyl;
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use rayon::prelude::*;
+use thiserror::Error;
+
+use crate::operator::Operator;
+pub use basis::{Certificate, Eigenbasis, InertiaCount, Method};
+use component::{Component, DENSE_BELOW, Pairs};
+use finish::finish;
+use spectrum::{keep_lowest, lowest};
+
+/// How many eigenpairs, and how exactly.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EigenOptions {
+    /// K, eigenpairs wanted; all there are if fewer. Default 500 (Iza-Teran and Garcke 2018). Time grows in proportion,
+    /// memory by 8 N bytes a pair.
+    pub count: usize,
+    /// A pair is accepted when ‖L φ − λ M φ‖ in the M⁻¹ norm is below tolerance × λ_K. Default 1e-10, which leaves
+    /// eigenvalues exact to about 1e-12 λ_K; 1e-6 is ample for descriptors and saves a sixth of the time.
+    pub tolerance: f64,
+    /// Seed of the random start vectors. Default 1. Another seed gives the same spectrum with other rounding.
+    pub seed: u64,
+    /// Components of at most this many degrees of freedom, and those of which more than half of all pairs are wanted,
+    /// go through the dense solver. Default 400, where the two cost the same. The dense solver takes O(n³) time.
+    pub dense_below: usize,
+}
+
+impl Default for EigenOptions {
+    fn default() -> EigenOptions {
+        EigenOptions {
+            count: 500,
+            tolerance: 1e-10,
+            seed: 1,
+            dense_below: DENSE_BELOW,
+        }
+    }
+}
+
+/// How a long computation reports to its caller, and how the caller stops it. Called from several threads.
+pub trait Watch: Sync {
+    /// `done` of `total` units of a stage are done.
+    fn step(&self, _stage: &'static str, _done: usize, _total: usize) {}
+    /// Asked often; once it says true, the computation ends with [`EigenError::Stopped`].
+    fn stopped(&self) -> bool {
+        false
+    }
+}
+
+/// Silence: what tests and scripts pass.
+impl Watch for () {}
+
+/// Why there is no eigenbasis.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum EigenError {
+    /// The caller stopped the computation.
+    #[error("stopped")]
+    Stopped,
+    /// An option is out of its range.
+    #[error("{option} = {value}: {expected}")]
+    Option {
+        /// The option's name.
+        option: &'static str,
+        /// Its value.
+        value: f64,
+        /// What was expected.
+        expected: &'static str,
+    },
+    /// L or M scale to numbers that cannot be held.
+    #[error(
+        "degree of freedom {dof}: stiffness divided by mass is not finite; rescale the model or drop its tiny faces"
+    )]
+    NotFinite {
+        /// The degree of freedom, numbered from 0.
+        dof: usize,
+    },
+    /// The factor does not fit in memory.
+    #[error("{dofs} degrees of freedom: the factorisation does not fit in memory")]
+    OutOfMemory {
+        /// Degrees of freedom of the component.
+        dofs: usize,
+    },
+    /// Pairs are missing after all attempts. Nothing is returned, because a spectrum with holes looks like one without.
+    #[error("{found} of {wanted} eigenpairs found: {detail}; try another seed, or fewer pairs")]
+    NotConverged {
+        /// Pairs found.
+        found: usize,
+        /// Pairs wanted.
+        wanted: usize,
+        /// What was seen at the last attempt.
+        detail: String,
+    },
+    /// Two vectors share an eigenspace.
+    #[error("eigenvectors are not orthogonal: an inner product of {loss:e}; try another seed")]
+    NotOrthogonal {
+        /// max |Φᵀ M Φ − I|.
+        loss: f64,
+    },
+    /// Residuals are above what was asked for and above what rounding explains.
+    #[error(
+        "residual {residual:e} of the largest eigenvalue: above the tolerance {tolerance:e} and the rounding floor {floor:e}"
+    )]
+    Residual {
+        /// max ‖L φ − λ M φ‖ / λ_K.
+        residual: f64,
+        /// The tolerance asked for.
+        tolerance: f64,
+        /// What rounding alone leaves, relative to λ_K.
+        floor: f64,
+    },
+}
+
+/// The watch, with a common count of pairs found.
+pub(crate) struct Progress<'a> {
+    watch: &'a dyn Watch,
+    done: AtomicUsize,
+    total: usize,
+}
+
+impl Progress<'_> {
+    pub(crate) fn stopped(&self) -> bool {
+        self.watch.stopped()
+    }
+
+    pub(crate) fn add(&self, pairs: usize) {
+        let done = self.done.fetch_add(pairs, Ordering::Relaxed) + pairs;
+        self.watch
+            .step("eigenpairs", done.min(self.total), self.total);
+    }
+}
+
+/// The K lowest eigenpairs of L φ = λ M φ.
+///
+/// Every connected component is solved by itself and the spectra are merged, so an eigenvector lives on one component
+/// and is zero on the others. Null vectors, one a component, are in closed form. Equal components bring equal
+/// eigenvalues, which [`Eigenbasis::clusters`] and [`Eigenbasis::sensitive`] report.
+///
+/// Large components go through shift-invert block Lanczos in slices of the spectrum; Sylvester's law of inertia counts
+/// the eigenvalues below every shift, so that none can be missing. The result is the same bytes on any number of
+/// threads, on one kind of processor.
+///
+/// # Errors
+/// Pairs that cannot be found, or not to the tolerance, are an error that says so with numbers; never a shorter or
+/// poorer basis. [`EigenError::Stopped`] within about a second of [`Watch::stopped`] (a factorisation of a large mesh
+/// is not interrupted).
+pub fn eigenbasis(
+    operator: &Operator,
+    options: &EigenOptions,
+    watch: &dyn Watch,
+) -> Result<Eigenbasis, EigenError> {
+    let &EigenOptions {
+        count,
+        tolerance,
+        seed,
+        dense_below,
+    } = options;
+    if count == 0 {
+        return Err(EigenError::Option {
+            option: "count",
+            value: 0.0,
+            expected: "at least one eigenpair",
+        });
+    }
+    if !(tolerance > 0.0 && tolerance < 1e-2) {
+        return Err(EigenError::Option {
+            option: "tolerance",
+            value: tolerance,
+            expected: "between 0 and 0.01",
+        });
+    }
+    let count = count.min(operator.mass.len());
+    let progress = Progress {
+        watch,
+        done: AtomicUsize::new(0),
+        total: count,
+    };
+
+    let mut components = split(operator)?;
+    let area: f64 = operator.mass.iter().sum();
+    // The share of the pairs that Weyl's law gives a component, with a fifth to spare.
+    let expected = |component: &Component| 1.2 * component.area / area * count as f64 + 2.0;
+    let dense: Vec<bool> = components
+        .iter()
+        .map(|component| {
+            component.rows() <= dense_below.max(16)
+                || 2.0 * expected(component) > component.rows() as f64
+        })
+        .collect();
+    components
+        .par_iter_mut()
+        .zip(&dense)
+        .filter(|(_, dense)| !**dense)
+        .try_for_each(|(component, _)| component.prepare())?;
+
+    let mut solved: Vec<Pairs> = lowest(&components, &dense, count, tolerance, seed, &progress)?;
+    let next = keep_lowest(&mut solved, count);
+    let evidence = components
+        .par_iter()
+        .zip(&mut solved)
+        .map(|(component, pairs)| finish(component, pairs))
+        .collect::<Result<Vec<_>, _>>()?;
+    if progress.stopped() {
+        return Err(EigenError::Stopped);
+    }
+    let basis = basis::merge(operator, &components, &solved, &evidence, next, tolerance);
+    let Certificate {
+        residual_max: residual,
+        residual_floor: floor,
+        orthogonality: loss,
+        ..
+    } = basis.certificate;
+    if residual.is_nan() || residual > tolerance.max(floor) {
+        return Err(EigenError::Residual {
+            residual,
+            tolerance,
+            floor,
+        });
+    }
+    if loss.is_nan() || loss > 1e-10 {
+        return Err(EigenError::NotOrthogonal { loss });
+    }
+    progress.add(0);
+    Ok(basis)
+}
+
+/// The operator's connected components, each with its own rows.
+fn split(operator: &Operator) -> Result<Vec<Component>, EigenError> {
+    let mut dofs: Vec<Vec<u32>> = vec![Vec::new(); operator.components];
+    let mut place_of_dof = vec![0; operator.mass.len()];
+    for (dof, &component) in operator.component_of_dof.iter().enumerate() {
+        place_of_dof[dof] = dofs[component as usize].len() as u32;
+        dofs[component as usize].push(dof as u32);
+    }
+    dofs.into_par_iter()
+        .map(|dofs| Component::new(operator, dofs, &place_of_dof))
+        .collect()
+}

@@ -1,0 +1,59 @@
+# Recipes of the house. `just check` is what CI runs; `.ci/run` installs what it needs.
+
+export PATH := justfile_directory() / "target/python/bin" + ":" + env("PATH")
+
+study := "target/hat-section"
+
+# this list
+default:
+    @just --list --unsorted
+
+# everything that must be green
+check: fmt spelling clippy doc test-all example deny
+
+# formatting
+fmt:
+    cargo fmt --all --check
+
+# spelling, in code and text
+spelling:
+    typos
+
+# lints, warnings denied
+clippy:
+    cargo clippy --workspace --all-targets -- -D warnings
+
+# the crates' documentation, warnings denied
+doc:
+    RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps
+
+# the tests; those that need Python packages or Chromium skip, with a word, where these are missing
+test:
+    cargo test --workspace
+
+# the same command, with nothing allowed to skip
+test-all:
+    CRUMPLE_TESTS_MUST_RUN=1 cargo test --workspace
+
+# the example from its files to the report
+example:
+    rm -rf {{ study }}
+    cargo run --release -- analyze examples/hat-section/runs --params examples/hat-section/inputs.csv --join 2.5 -o {{ study }}
+    test -s {{ study }}/report.html
+
+# licences, forbidden crates and sources of Cargo.lock; without network
+deny:
+    cargo deny check licenses bans sources
+
+# known vulnerabilities and yanked crates; needs network
+advisories:
+    cargo deny check advisories
+
+# `crumple analyze` beside lasso-python + SciPy + scikit-learn on one bundle, alternating
+bench-analyze bundle="examples/hat-section/runs" repeats="3":
+    cargo build --release
+    python3 benches/side_by_side.py {{ bundle }} --repeats {{ repeats }} --scratch target/side-by-side
+
+# fetch and bundle the report's JavaScript anew
+vendor:
+    crates/crumple/src/report/page/vendor/make.sh
