@@ -12,7 +12,7 @@ use crate::inputs::Table;
 use crate::modes::{self, ModesOptions, Points, adjusted_rand_index};
 use crate::rivals::Pca;
 use crate::similarity::cosine;
-use crate::study::{Coefficients, Loaded, Rows};
+use crate::study::{Coefficients, Loaded};
 use crate::target::Named;
 
 /// Everything `compare` finds.
@@ -77,21 +77,21 @@ pub struct ModesAgreement {
 /// # Errors
 /// [`Error::NoMatch`] for labels that fit no run, [`Error::NoModes`] without labels and modes, reading errors.
 pub fn compare(loaded: &Loaded, labels: Option<&Table>, threshold: Threshold) -> Result<Comparison, Error> {
-    let rows = loaded.study.coefficients(None, Rows::Last)?;
+    let rows = loaded.last_states()?;
     let (judges, notes) = match labels {
-        Some(table) => Judge::of_labels(&rows, loaded, table)?,
+        Some(table) => Judge::of_labels(rows, loaded, table)?,
         None => (
-            Judge::of_modes(&rows, loaded)?,
+            Judge::of_modes(rows, loaded)?,
             vec!["without labels there is nothing to judge a ranking by: precision is left out".to_owned()],
         ),
     };
     let mut result = Vec::new();
     for judge in &judges.queries {
         for select in [Select::Coordinates, Select::Difference] {
-            result.extend(judge_query(loaded, &rows, &judges, judge, select, threshold)?);
+            result.extend(judge_query(loaded, rows, &judges, judge, select, threshold)?);
         }
     }
-    let modes = if labels.is_some() { agreements(loaded, &rows, &judges)? } else { Vec::new() };
+    let modes = if labels.is_some() { agreements(loaded, rows, &judges)? } else { Vec::new() };
     Ok(Comparison { rows: result, modes, notes })
 }
 

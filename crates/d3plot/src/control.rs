@@ -52,6 +52,9 @@ pub(crate) struct Control {
     pub(crate) mdlopt: u8,
     pub(crate) sph: u64,
     pub(crate) narbs: u64,
+    /// Airbags of particles, and the version of their sections.
+    pub(crate) airbags: u64,
+    pub(crate) airbag_version: i64,
     /// IOSHL 1 and 2 for shells and for solids: stress, plastic strain.
     pub(crate) shell_stress: bool,
     pub(crate) shell_strain: bool,
@@ -113,8 +116,9 @@ impl Control {
         if ndim == 3 {
             return Err(word.unsupported("packed connectivity (NDIM = 3, the layout of before 1990)"));
         }
-        if word.int(54) != 0 {
-            return Err(word.unsupported(&format!("airbag particles or discrete elements (NPEFG = {})", word.int(54))));
+        let npefg = word.int(54);
+        if !(0..10_000_000).contains(&npefg) {
+            return Err(word.unsupported(&format!("discrete elements beside airbag particles (NPEFG = {npefg})")));
         }
         if word.int(48) == MULTI_SOLVER {
             return Err(word.unsupported(&format!("data of several solvers (NCFDV1 = {MULTI_SOLVER})")));
@@ -174,6 +178,8 @@ impl Control {
             mdlopt,
             sph: word.count("NMSPH", 37)?,
             narbs: word.count("NARBS", 39)?,
+            airbags: (npefg % 1000).unsigned_abs(),
+            airbag_version: npefg / 1000,
             shell_stress: written(43, &[1000]),
             shell_strain: written(44, &[1000]),
             solid_stress: written(43, &[999, 1000]),

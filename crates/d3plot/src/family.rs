@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::airbags::uncertain_airbags;
 use crate::control::{Control, Header};
 use crate::detect::{self, FileType};
 use crate::elements::Geometry;
@@ -235,19 +236,33 @@ fn locate(
         }
         None => (declared, walk),
     };
-    if reading.rigid_bodies > 0 && (walk.doubtful > 0 || walk.confirmed == 0) {
-        return Err(uncertain_rigid_bodies(control, stream));
-    }
-    let unread = |warning: &Warning| matches!(warning, Warning::UnreadTail { .. });
-    if control.reduced && walk.confirmed == 0 && walk.warnings.iter().any(unread) {
-        let what = format!(
-            "reduced output (INUM < 0) whose states do not end every {} words, as the control block has it",
-            layout.words
-        );
-        return Err(Error::Unsupported { path: stream.root().to_owned(), what });
-    }
+    refuse_uncertain(control, stream, reading, &layout, &walk)?;
     warnings.append(&mut walk.warnings);
     Ok((layout, walk))
+}
+
+/// Layouts of which no real file was at hand are believed only if the members confirm them.
+fn refuse_uncertain(
+    control: &Control,
+    stream: &Stream,
+    reading: &Reading,
+    layout: &Layout,
+    walk: &Walk,
+) -> Result<(), Error> {
+    let contradicted = walk.warnings.iter().any(|warning| matches!(warning, Warning::UnreadTail { .. }));
+    let confirmed = walk.confirmed > 0 || walk.starts.is_empty();
+    if reading.rigid_bodies > 0 && (contradicted || !confirmed) {
+        return Err(uncertain_rigid_bodies(control, stream));
+    }
+    if control.airbags > 0 && (contradicted || !confirmed) {
+        return Err(uncertain_airbags(stream));
+    }
+    if control.reduced && contradicted && !confirmed {
+        let words = layout.words;
+        let what = format!("reduced output (INUM < 0) whose states do not have the {words} words of the control block");
+        return Err(Error::Unsupported { path: stream.root().to_owned(), what });
+    }
+    Ok(())
 }
 
 fn header(control: &Control, titles: &Titles, layout: &Layout) -> Header {

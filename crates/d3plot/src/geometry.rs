@@ -4,6 +4,7 @@
 //! That is why the result is believed only when connectivity stays within the nodes, the numbering repeats the counts
 //! of the control block, and an end mark or a plausible time comes next.
 
+use crate::airbags::{Airbags, read_airbags, uncertain_airbags};
 use crate::control::Control;
 use crate::cursor::Cursor;
 use crate::elements::{Beam, Geometry, Particle, Shell, Solid};
@@ -27,6 +28,7 @@ pub(crate) struct Reading {
     pub(crate) rigid_shells: u64,
     /// Words an SPH particle has in a state.
     pub(crate) sph_words: u64,
+    pub(crate) airbags: Airbags,
     /// NDIM 8, 9: the nodes, from 0, that the nodal blocks hold.
     pub(crate) active: Option<Vec<u32>>,
     pub(crate) rigid_bodies: u64,
@@ -73,7 +75,11 @@ pub(crate) fn read_geometry(control: &Control, stream: &Stream) -> Result<Readin
     match first_error {
         Some(error) if readings.is_empty() => Err(error),
         _ if control.rigid_bodies() => the_certain_one(control, stream, readings),
-        _ => Ok(best(readings)),
+        _ => {
+            let reading = best(readings);
+            let checks = reading.numbers_agree && reading.mark;
+            if control.airbags > 0 && !checks { Err(uncertain_airbags(stream)) } else { Ok(reading) }
+        }
     }
 }
 
@@ -121,6 +127,7 @@ fn read_sections(control: &Control, stream: &Stream, choice: Choice, cursor: &mu
     }
     cursor.skip(control.fluid_parts, 1, "fluid parts")?;
     let sph_words = if control.sph > 0 { sph_words(cursor)? } else { 0 };
+    let airbags = read_airbags(control, cursor)?;
 
     let mut geometry = Geometry { coordinates: coordinates(control, cursor)?, ..Geometry::default() };
     geometry.solids = elements(control, cursor, control.solids, "solids", solid)?;
@@ -141,6 +148,7 @@ fn read_sections(control: &Control, stream: &Stream, choice: Choice, cursor: &mu
     let rigid = if control.rigid_bodies() { rigid_bodies(control, cursor, choice.once)? } else { Rigid::default() };
     cursor.skip(control.adapted, 2, "parents of adapted elements")?;
     geometry.sph = elements(control, cursor, control.sph, "SPH particles", particle)?;
+    airbags.skip_geometry(control, cursor)?;
     let road_surfaces = if control.road() { road(cursor)? } else { 0 };
     extra_connectivity(control, cursor, choice)?;
 
@@ -153,6 +161,7 @@ fn read_sections(control: &Control, stream: &Stream, choice: Choice, cursor: &mu
         numbers_agree: agree,
         rigid_shells,
         sph_words,
+        airbags,
         active: rigid.active,
         rigid_bodies: rigid.bodies,
         rigid_and_active_are_all: rigid.complete,

@@ -32,6 +32,7 @@ mod control;
 mod detect;
 
 // the geometry
+mod airbags;
 mod elements;
 mod geometry;
 mod numbering;

@@ -6,7 +6,17 @@
 use crate::control::Control;
 use crate::geometry::Reading;
 
-/// A table in every state: one row a thing, so many words a row.
+/// A table in every state: one row a thing, so many words a row. The names, in the order of the file:
+///
+/// - of the state: `time`, `globals`;
+/// - of nodes: `coordinates` or `displacement`, `temperature`, `heat_flux`, `mass_scaling`, `temperature_rate`,
+///   `residual_force`, `residual_moment`, `contact_penetration`, `contact_energy`, `kinetic_energy`, `velocity`,
+///   `acceleration`;
+/// - of elements: `solid_thermal`, `solid`, `thick_shell`, `beam`, `shell` (stress, plastic strain, histories …);
+/// - the rest: `node_deletion` or `element_deletion` (0 = deleted; elements in the order solids, thick shells, shells,
+///   beams), `sph`, `airbag`, `airbag_particle`, `road`, `rigid_motion`.
+///
+/// Units are those of the run; the file does not tell them.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Field {
@@ -163,6 +173,8 @@ impl Variant {
             ("node_deletion", node_deletion, 1),
             ("element_deletion", element_deletion, 1),
             ("sph", control.sph, self.sph_words),
+            ("airbag", control.airbags, reading.airbags.words_in_state),
+            ("airbag_particle", reading.airbags.particles, reading.airbags.words_of_particle),
             ("road", reading.road_surfaces, 6),
             ("rigid_motion", reading.rigid_bodies, self.rigid_motion),
         ];

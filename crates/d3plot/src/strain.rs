@@ -8,6 +8,9 @@ use crate::family::Family;
 use crate::results::Table;
 use crate::state::Field;
 
+/// Bytes read at a time.
+const PIECE: u64 = 1 << 22;
+
 /// Which of the points of an element a value is taken from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Layers {
@@ -143,35 +146,48 @@ impl Family {
     /// Plastic strain at all points: one row an element of the geometry.
     fn strain_table(&self, state: usize, strain: Option<Strain>) -> Result<Option<Table>, Error> {
         let start = self.start(state)?;
-        let Some(strain) = strain else {
-            return Ok(None);
-        };
-        let Some(field) = self.layout.field(strain.field) else {
-            return Ok(None);
-        };
-        let bytes = self.bytes_of(start, field)?;
-        let size = self.control.words.size() as usize;
-        let mut rows = bytes.chunks_exact(field.columns as usize * size);
-        let mut values = Vec::new();
-        let mut take = |row: Option<&[u8]>| match row {
-            None => values.extend(std::iter::repeat_n(f64::NAN, strain.points)),
-            Some(row) => values.extend((0..strain.points).map(|point| {
-                let at = (point * strain.each + strain.at) * size;
-                self.control.words.float(&row[at..at + size])
-            })),
-        };
+        let Some(strain) = strain else { return Ok(None) };
+        let Some(field) = self.layout.field(strain.field) else { return Ok(None) };
+        let mut values = self.strain_rows(start, field, &strain)?;
         if strain.field == "shell" && self.layout.rigid_shells > 0 {
-            let listed = self.geometry().rigid_shells.iter().filter(|rigid| **rigid).count() as u64;
-            if listed != self.layout.rigid_shells {
-                let what =
-                    format!("{} rigid shells without words, {listed} of a rigid material", self.layout.rigid_shells);
-                return Err(Error::Unsupported { path: self.root().to_owned(), what });
-            }
-            self.rigid_shells().for_each(|rigid| take(if rigid { None } else { rows.next() }));
-        } else {
-            rows.for_each(|row| take(Some(row)));
+            values = self.with_rigid_shells(&values, strain.points)?;
         }
         Ok(Some(Table { values, columns: strain.points }))
+    }
+
+    /// The strains of the rows that the file has. A shell with histories may have hundreds of words of which few are
+    /// wanted, so the block is read in pieces.
+    fn strain_rows(&self, start: u64, field: &Field, strain: &Strain) -> Result<Vec<f64>, Error> {
+        let size = self.control.words.size();
+        let at_once = (PIECE / (field.columns * size)).max(1);
+        let mut values = Vec::new();
+        let mut row = 0;
+        while row < field.rows {
+            let rows = at_once.min(field.rows - row);
+            let offset = field.offset + row * field.columns;
+            let bytes = self.bytes_of(start, &Field { rows, offset, ..field.clone() })?;
+            for element in bytes.chunks_exact((field.columns * size) as usize) {
+                values.extend((0..strain.points).map(|point| {
+                    let at = (point * strain.each + strain.at) * size as usize;
+                    self.control.words.float(&element[at..at + size as usize])
+                }));
+            }
+            row += rows;
+        }
+        Ok(values)
+    }
+
+    /// Puts NaN between the rows of the file where a shell is rigid.
+    fn with_rigid_shells(&self, values: &[f64], points: usize) -> Result<Vec<f64>, Error> {
+        let listed = self.rigid_shells().filter(|rigid| *rigid).count() as u64;
+        if listed != self.layout.rigid_shells {
+            let what = format!("{} rigid shells without words, {listed} of a rigid material", self.layout.rigid_shells);
+            return Err(Error::Unsupported { path: self.root().to_owned(), what });
+        }
+        let mut rows = values.chunks_exact(points);
+        let missing = vec![f64::NAN; points];
+        let row = |rigid| if rigid { &missing[..] } else { rows.next().unwrap_or(&missing) };
+        Ok(self.rigid_shells().map(row).collect::<Vec<&[f64]>>().concat())
     }
 
     fn strain_of(&self, state: usize, strain: Option<Strain>, layers: Layers) -> Result<Option<Vec<f64>>, Error> {

@@ -20,17 +20,20 @@ pub(crate) struct Walk {
     pub(crate) starts: Vec<u64>,
     /// Its time.
     pub(crate) times: Vec<f64>,
-    /// Members with states that end where a state of this length ends.
+    /// Members with states that end where a state of this length ends: at a mark, at padding, at the last byte.
     pub(crate) confirmed: usize,
+    /// Those of them that end at a mark.
+    marked: usize,
     /// Members that do not.
     pub(crate) doubtful: usize,
     pub(crate) warnings: Vec<Warning>,
 }
 
 impl Walk {
-    /// Whether this length fits the members and `other` does not.
+    /// Whether this length fits the members and `other` does not. Only marks count: a wrong length may well end at the
+    /// last byte of a cut member, or in padding.
     pub(crate) fn fits_better_than(&self, other: &Walk) -> bool {
-        self.confirmed > other.confirmed && self.doubtful < other.doubtful
+        self.marked > other.marked && self.doubtful < other.doubtful
     }
 }
 
@@ -80,10 +83,13 @@ impl<'a> Walker<'a> {
             }
             let before = walk.starts.len();
             let stop = self.walk_member(index, &mut at, state, longest, &mut walk)?;
+            let has_states = walk.starts.len() > before || at > member.start && index > 0;
             match stop {
-                Stop::End => {
-                    walk.confirmed += usize::from(walk.starts.len() > before || at > member.start && index > 0)
+                Stop::Mark | Stop::End if has_states => {
+                    walk.confirmed += 1;
+                    walk.marked += usize::from(matches!(stop, Stop::Mark));
                 }
+                Stop::Mark | Stop::End => {}
                 Stop::Doubt | Stop::Cut => walk.doubtful += 1,
                 Stop::RanOn => {}
             }
@@ -97,7 +103,7 @@ impl<'a> Walker<'a> {
                     next_start = member.number.saturating_add(u32::try_from(spans).unwrap_or(u32::MAX));
                     index += members[index..].iter().take_while(|member| member.number < next_start).count();
                 }
-                Stop::End | Stop::Doubt | Stop::Cut => {
+                Stop::Mark | Stop::End | Stop::Doubt | Stop::Cut => {
                     next_start = member.number + 1;
                     index += 1;
                 }
@@ -127,7 +133,7 @@ impl<'a> Walker<'a> {
             }
             let time = self.word(*at, state)?;
             if time == END_MARK {
-                return Ok(Stop::End);
+                return Ok(Stop::Mark);
             }
             let empty = time == 0.0 && *at >= self.content_end(index)?;
             let at_start = index > 0 && *at == member.start;
@@ -213,7 +219,9 @@ impl<'a> Walker<'a> {
 
 /// How a member came to its end.
 enum Stop {
-    /// At a mark, at padding, or at the last byte.
+    /// At a mark.
+    Mark,
+    /// At padding, or at the last byte.
     End,
     /// At a word that is no time.
     Doubt,

@@ -239,3 +239,46 @@ fn states_may_be_read_in_any_order_by_many_threads() {
         }
     });
 }
+
+/// Writes airbag sections into a family without them, as the manual has them: two bags, 5 particles.
+fn with_airbags(copy: &Copy, version: i32) {
+    let words = |values: &[i32]| values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>();
+    copy.poke(&[(54, version * 1000 + 2)]);
+    let root = copy.read("d3plot");
+    let whole = open("s12_node_deletion");
+    let mark = root.windows(4).position(|bytes| bytes == (-999_999.0_f32).to_le_bytes()).unwrap();
+    let (of_bag, of_particle, particles, in_state) = (4, 14, 5, 2);
+    let mut control = words(&[of_bag, of_particle, particles, in_state]);
+    control.extend(words(&[3][..usize::from(version == 4)]));
+    control.extend(words(&vec![1; 9 * (of_bag + of_particle + in_state) as usize]));
+    let geometry = words(&vec![7; 2 * of_bag as usize]);
+    copy.write("d3plot", &[&root[..256], &control, &root[256..mark], &geometry, &root[mark..]].concat());
+    let (states, size) = (copy.read("d3plot01"), whole.header().words_per_state as usize * 4);
+    let mut longer = Vec::new();
+    for state in states.chunks_exact(size).take(whole.times().len()) {
+        longer.extend_from_slice(state);
+        longer.extend(vec![0x3f; (2 * in_state + particles * of_particle) as usize * 4]);
+    }
+    longer.extend((-999_999.0_f32).to_le_bytes());
+    copy.write("d3plot01", &longer);
+}
+
+#[test]
+fn airbag_particles_are_passed_over_if_the_end_marks_confirm_them() {
+    let whole = open("s12_node_deletion");
+    for version in [0, 3, 4] {
+        let copy = Copy::of("s12_node_deletion");
+        with_airbags(&copy, version);
+        let family = Family::open(&copy.root()).unwrap();
+        assert_eq!(family.warnings(), []);
+        assert_eq!((family.geometry(), family.times()), (whole.geometry(), whole.times()));
+        for state in 0..whole.times().len() {
+            assert_eq!(family.coordinates(state).unwrap(), whole.coordinates(state).unwrap());
+            assert_eq!(family.deletion(state).unwrap(), whole.deletion(state).unwrap());
+        }
+        // one word more a particle than the states have: refused, not guessed
+        copy.poke(&[(65, copy.word(65) + 1), (67, copy.word(67) - 1)]);
+        let error = Family::open(&copy.root()).unwrap_err();
+        assert!(error.to_string().contains("airbag particles (NPEFG)"), "{error}");
+    }
+}

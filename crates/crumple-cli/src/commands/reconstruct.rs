@@ -8,7 +8,7 @@ use crumple::descriptor::{self, Select};
 use crumple::export::{write_obj, write_stl};
 use crumple::reconstruct::{errors, reconstruct};
 use crumple::rivals::Pca;
-use crumple::study::{Loaded, Rows, write_shape};
+use crumple::study::{Loaded, write_shape};
 use crumple::target::{self, Named, resolve};
 use serde_json::json;
 
@@ -57,14 +57,14 @@ impl Reconstruct {
     }
 
     fn shape(&self, loaded: &Loaded, delta: &[[f64; 3]]) -> Result<(String, usize, Vec<[f64; 3]>), Error> {
-        let Loaded { reference, basis, study } = loaded;
+        let Loaded { reference, basis, study, .. } = loaded;
         if let Some(name) = &self.descriptor {
             let descriptor = descriptor::load(study, name)?;
             let shape = reconstruct(reference, basis, descriptor.select, &descriptor.eigenvectors, delta);
             return Ok((format!("descriptor '{name}'"), descriptor.eigenvectors.len(), shape));
         }
         if let Some(components) = self.pca {
-            let pca = Pca::of(&study.coefficients(None, Rows::Last)?, components);
+            let pca = Pca::of(loaded.last_states()?, components);
             return Ok(("principal components".into(), pca.components(), pca.shape(loaded, delta)));
         }
         let count = self.first.unwrap_or(basis.eigenpairs());

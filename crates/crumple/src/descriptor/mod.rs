@@ -14,7 +14,7 @@ use crate::Error;
 use crate::basis::Basis;
 use crate::reconstruct::{Errors, errors, reconstruct};
 use crate::rivals::Pca;
-use crate::study::{Loaded, Rows};
+use crate::study::Loaded;
 use crate::target::{self, Named, Target};
 
 /// Which magnitudes are compared with t.
@@ -205,7 +205,7 @@ fn rms_of(
 }
 
 fn pca_rival(loaded: &Loaded, target: &Target, original: &[[f64; 3]], components: usize) -> Result<Rival, Error> {
-    let pca = Pca::of(&loaded.study.coefficients(None, Rows::Last)?, components);
+    let pca = Pca::of(loaded.last_states()?, components);
     let shape = pca.shape(loaded, &target.delta);
     Ok(Rival {
         method: PCA.into(),

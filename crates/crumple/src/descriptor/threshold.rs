@@ -118,6 +118,21 @@ impl Threshold {
     }
 }
 
+impl Threshold {
+    /// The rule in words, for a page.
+    pub fn words(&self) -> String {
+        match self {
+            Self::Std(c) if *c == 1.0 => "mean + 1 standard deviation".into(),
+            Self::Std(c) => format!("mean + {c} standard deviations"),
+            Self::Mean(c) => format!("{c} times the mean"),
+            Self::Value(_) => "a given value".into(),
+            Self::Top(m) => format!("the {m} largest"),
+            Self::Energy(share) => format!("{:.3} % of the squared coefficients", 100.0 * share),
+            Self::Error(length) => format!("as many as leave an error of {length}"),
+        }
+    }
+}
+
 impl fmt::Display for Threshold {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

@@ -242,7 +242,17 @@ pub(crate) struct Points {
 impl Points {
     pub(crate) fn of(rows: &Coefficients, area: f64) -> Self {
         let scale = 1.0 / area.sqrt();
-        Self { width: 3 * rows.eigenvectors.len(), values: rows.values.iter().map(|&x| f64::from(x) * scale).collect() }
+        let (count, width) = (rows.rows(), 3 * rows.eigenvectors.len());
+        let values: Vec<f64> = rows.values.iter().map(|&x| f64::from(x) * scale).collect();
+        if count >= width {
+            return Self { width, values };
+        }
+        // Fewer points than coordinates: with X = Rᵀ Qᵀ the rows of Rᵀ are the same points in a frame of their own
+        // span, all distances kept, and everything below costs that much less.
+        let factor = faer::MatRef::from_column_major_slice(&values, width, count).qr();
+        let r = factor.thin_R();
+        let values = (0..count).flat_map(|run| (0..count).map(move |at| r[(at, run)])).collect();
+        Self { width: count, values }
     }
 
     pub(crate) fn count(&self) -> usize {

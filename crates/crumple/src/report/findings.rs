@@ -1,15 +1,17 @@
 //! Everything the report shows, as plain data.
 
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use base64::Engine;
 use mesh_spectrum::Watch;
+use rayon::prelude::*;
 use serde::Serialize;
 
 use super::picture::{View, picture};
 use super::thin::Thin;
 use crate::Error;
-use crate::descriptor::{self, DescribeOptions, Described, Rival, describe};
+use crate::descriptor::{self, DescribeOptions, Described, FIRST_M, Rival, Threshold, describe};
 use crate::modes::{Mode, Modes, Tried};
 use crate::project::synthesize;
 use crate::reconstruct::{Errors, displaced};
@@ -63,6 +65,8 @@ struct MeshData {
     /// A position is origin + step × u16.
     origin: [f64; 3],
     step: f64,
+    /// Colours span −range to range of z-displacement, in the length unit.
+    range: f64,
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -148,21 +152,17 @@ pub fn findings(
     options: &DescribeOptions,
     watch: &dyn Watch,
 ) -> Result<Findings, Error> {
-    let mut described = Vec::new();
-    for (done, mode) in modes.modes.iter().enumerate() {
+    let done = AtomicUsize::new(0);
+    let describe_mode = |mode: &Mode| {
         if watch.stopped() {
             return Err(Error::Stopped);
         }
-        watch.step("drawing modes", done, modes.modes.len());
-        described.push(describe(
-            loaded,
-            &Named { run: mode.medoid.clone(), state: None },
-            Some(&mode.name),
-            &mode.name,
-            &options_of(loaded, mode, options),
-        )?);
-    }
-    watch.step("drawing modes", modes.modes.len(), modes.modes.len());
+        let named = Named { run: mode.medoid.clone(), state: None };
+        let described = describe(loaded, &named, Some(&mode.name), &mode.name, &options_of(loaded, mode, options))?;
+        watch.step("describing modes", done.fetch_add(1, Ordering::Relaxed) + 1, modes.modes.len());
+        Ok(described)
+    };
+    let described: Vec<Described> = modes.modes.par_iter().map(describe_mode).collect::<Result<_, Error>>()?;
     let study = &loaded.study;
     let manifest = study.manifest();
     let cloud = (loaded.basis.facts.null_space + 1).min(loaded.basis.eigenpairs());
@@ -170,10 +170,11 @@ pub fn findings(
     let runs = run_data(loaded, modes, cloud, &similarity)?;
     let range =
         described.iter().flat_map(|d| z_displacement(loaded, &d.original)).fold(0.0, |most: f64, z| most.max(z.abs()));
-    let (mesh, shapes) = shapes(loaded, modes, &described)?;
+    let range = plain(range);
+    let (mesh, shapes) = shapes(loaded, modes, &described, range)?;
     let modes_data = modes
         .modes
-        .iter()
+        .par_iter()
         .zip(&described)
         .enumerate()
         .map(|(color, (mode, described))| mode_data(loaded, mode, described, color, range, &similarity))
@@ -211,7 +212,7 @@ fn options_of(loaded: &Loaded, mode: &Mode, options: &DescribeOptions) -> Descri
 }
 
 fn study_facts(loaded: &Loaded) -> StudyFacts {
-    let Loaded { study, reference, basis } = loaded;
+    let Loaded { study, reference, basis, .. } = loaded;
     let (settings, facts) = (study.settings(), &basis.facts);
     let records: Vec<&RunRecord> = study.manifest().runs.values().collect();
     let unit = &settings.length_unit;
@@ -362,13 +363,13 @@ fn mode_data(
         picture: format!("data:image/png;base64,{}", base64::engine::general_purpose::STANDARD.encode(png)),
         descriptor: DescriptorData {
             select: descriptor.select.word(),
-            rule: descriptor.rule.clone(),
+            rule: descriptor.rule.parse::<Threshold>().map_or_else(|_| descriptor.rule.clone(), |rule| rule.words()),
             threshold: descriptor.threshold,
             size: descriptor.eigenvectors.len(),
             numbers: 3 * descriptor.eigenvectors.len(),
             eigenvectors: descriptor.eigenvectors.clone(),
             errors: descriptor.errors,
-            rivals: descriptor.rivals.clone(),
+            rivals: descriptor.rivals.iter().map(named_for_the_page).collect(),
             spectrum: described.values.iter().map(|triple| triple.map(f64::abs)).collect(),
             nearest,
             shapes: BTreeMap::from([
@@ -379,6 +380,21 @@ fn mode_data(
             ]),
         },
     }
+}
+
+/// Rounded up to two significant digits, for a legend.
+fn plain(range: f64) -> f64 {
+    if range <= 0.0 {
+        return 0.0;
+    }
+    let unit = 10.0_f64.powf(range.log10().floor() - 1.0);
+    (range / unit).ceil() * unit
+}
+
+/// `first M` with its number: the page tells its pictures apart by it.
+fn named_for_the_page(rival: &Rival) -> Rival {
+    let method = if rival.method == FIRST_M { format!("first {}", rival.size) } else { rival.method.clone() };
+    Rival { method, ..rival.clone() }
 }
 
 /// What the medoid did, in numbers that an engineer reads off a picture: the change along its longest axis, and how
@@ -410,6 +426,7 @@ fn shapes(
     loaded: &Loaded,
     modes: &Modes,
     described: &[Described],
+    range: f64,
 ) -> Result<(MeshData, BTreeMap<String, String>), Error> {
     let reference = &loaded.reference;
     let needed = 4 * described.len() + 1;
@@ -428,10 +445,11 @@ fn shapes(
         .runs
         .iter()
         .filter(|(id, _)| modes.modes.iter().all(|mode| mode.medoid != **id))
-        .take(room);
-    for (id, record) in others {
-        wanted.push((format!("run:{id}"), thin.shape(&last_shape(loaded, id, record)?)));
-    }
+        .take(room)
+        .collect::<Vec<_>>();
+    let read =
+        |(id, record): (&String, &RunRecord)| Ok((format!("run:{id}"), thin.shape(&last_shape(loaded, id, record)?)));
+    wanted.extend(others.into_par_iter().map(read).collect::<Result<Vec<_>, Error>>()?);
     let points = || wanted.iter().flat_map(|(_, shape)| shape);
     let origin: [f64; 3] = std::array::from_fn(|c| points().map(|p| p[c]).fold(f64::INFINITY, f64::min));
     let extent = (0..3).map(|c| points().map(|p| p[c] - origin[c]).fold(0.0, f64::max)).fold(0.0, f64::max);
@@ -447,7 +465,7 @@ fn shapes(
     };
     let shapes = wanted.iter().map(|(name, shape)| (name.clone(), quantised(shape))).collect();
     let triangles = encode(thin.triangles.iter().flatten().flat_map(|vertex| vertex.to_le_bytes()).collect());
-    Ok((MeshData { triangles, vertices: thin.vertices.len(), origin, step }, shapes))
+    Ok((MeshData { triangles, vertices: thin.vertices.len(), origin, step, range }, shapes))
 }
 
 /// The last state of a run from its file; where that is gone, from its K coefficients.

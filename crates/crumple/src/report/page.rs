@@ -34,8 +34,8 @@ pub fn page(findings: &Findings) -> Result<String, Error> {
     let template = environment.get_template("page.html").map_err(|error| internal(error.to_string()))?;
     let values = context! {
         title => findings.title(),
-        // Inside a script element the only dangerous text is one that ends it.
-        findings_json => json.replace("</", "<\\/").replace("<!--", "<\\u0021--"),
+        // Without a < nothing inside the script element can end it or open a comment.
+        findings_json => json.replace('<', "\\u003c"),
         style => STYLE,
         vendor => VENDOR,
         script => SCRIPTS.join("\n"),

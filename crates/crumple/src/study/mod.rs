@@ -26,6 +26,7 @@ pub(crate) mod store;
 mod tables;
 
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use mesh_spectrum::Watch;
 use serde::{Deserialize, Serialize};
@@ -85,6 +86,7 @@ pub struct Loaded {
     pub reference: Reference,
     /// Its eigenbasis.
     pub basis: Basis,
+    last_states: OnceLock<Coefficients>,
 }
 
 impl Loaded {
@@ -102,7 +104,21 @@ impl Loaded {
     /// As [`Study::reference`], [`Study::basis`].
     pub fn of(study: Study) -> Result<Self, Error> {
         let (reference, basis) = (study.reference()?, study.basis()?);
-        Ok(Self { study, reference, basis })
+        Ok(Self { study, reference, basis, last_states: OnceLock::new() })
+    }
+}
+
+impl Loaded {
+    /// All K coefficients of the last state of every run, read once.
+    ///
+    /// # Errors
+    /// As [`Study::coefficients`].
+    pub fn last_states(&self) -> Result<&Coefficients, Error> {
+        if let Some(rows) = self.last_states.get() {
+            return Ok(rows);
+        }
+        let rows = self.study.coefficients(None, Rows::Last)?;
+        Ok(self.last_states.get_or_init(|| rows))
     }
 }
 

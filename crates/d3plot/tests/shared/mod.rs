@@ -55,6 +55,11 @@ impl Copy {
         std::fs::write(self.path(name), bytes).unwrap();
     }
 
+    /// A word (4 bytes, little endian) of the root.
+    pub fn word(&self, at: usize) -> i32 {
+        i32::from_le_bytes(self.read("d3plot")[at * 4..at * 4 + 4].try_into().unwrap())
+    }
+
     /// Overwrites words (4 bytes, little endian) of the root's control block.
     pub fn poke(&self, words: &[(usize, i32)]) {
         let mut bytes = self.read("d3plot");

@@ -89,48 +89,61 @@ pub(crate) fn outer<A: Arithmetic>(q: &[Row], w: &[Row]) -> Small {
     sum
 }
 
-/// Rows that are walked together, so that the part of W in use stays in the first-level cache (16 KiB).
-const PANEL: usize = 256;
+/// Rows that are walked together, so that a panel of each block in use stays in the first-level cache (8 KiB each).
+const PANEL: usize = 128;
 
-/// out[k] = Q_kᵀ W for each of the blocks.
+/// Q_kᵀ W_i for every block k and every i, the latter running faster.
 #[inline(always)]
-pub(crate) fn gram_with<A: Arithmetic>(blocks: &[&[Row]], w: &[Row], out: &mut [Small]) {
+pub(crate) fn gram_with<A: Arithmetic>(blocks: &[&[Row]], ws: &[&[Row]], out: &mut [Small]) {
     out.fill(SMALL_ZERO);
-    for first in (0..w.len()).step_by(PANEL) {
-        let panel = first..(first + PANEL).min(w.len());
-        for (block, out) in blocks.iter().zip(out.iter_mut()) {
-            let part = outer::<A>(&block[panel.clone()], &w[panel.clone()]);
-            for a in 0..WIDTH {
-                for k in 0..WIDTH {
-                    out[a][k] += part[a][k];
+    let rows = ws.first().map_or(0, |w| w.len());
+    for first in (0..rows).step_by(PANEL) {
+        let panel = first..(first + PANEL).min(rows);
+        for (block, out) in blocks.iter().zip(out.chunks_exact_mut(ws.len())) {
+            for (w, out) in ws.iter().zip(out) {
+                let part = outer::<A>(&block[panel.clone()], &w[panel.clone()]);
+                for a in 0..WIDTH {
+                    for k in 0..WIDTH {
+                        out[a][k] += part[a][k];
+                    }
                 }
             }
         }
     }
 }
 
-/// W += Σ_k Q_k C_k.
+/// W_i += Σ_k Q_k C_ki, the C as `gram_with` returns them.
 #[inline(always)]
-pub(crate) fn update_with<A: Arithmetic>(blocks: &[&[Row]], c: &[Small], w: &mut [Row]) {
-    for first in (0..w.len()).step_by(PANEL) {
-        let panel = first..(first + PANEL).min(w.len());
-        for (block, c) in blocks.iter().zip(c) {
-            let (tiles, rest) = w[panel.clone()].as_chunks_mut::<8>();
-            let (q_tiles, q_rest) = block[panel.clone()].as_chunks::<8>();
-            for (w, q) in tiles.iter_mut().zip(q_tiles) {
-                let mut sum = w.map(|row| row.0);
-                for a in 0..WIDTH {
-                    for r in 0..8 {
-                        add_scaled::<A>(&mut sum[r], q[r][a], &c[a]);
-                    }
-                }
-                *w = sum.map(Row);
+pub(crate) fn update_with<A: Arithmetic>(blocks: &[&[Row]], c: &[Small], ws: &mut [&mut [Row]]) {
+    let rows = ws.first().map_or(0, |w| w.len());
+    let each = ws.len();
+    for first in (0..rows).step_by(PANEL) {
+        let panel = first..(first + PANEL).min(rows);
+        for (block, c) in blocks.iter().zip(c.chunks_exact(each)) {
+            for (w, c) in ws.iter_mut().zip(c) {
+                update_panel::<A>(&block[panel.clone()], c, &mut w[panel.clone()]);
             }
-            for (w, q) in rest.iter_mut().zip(q_rest) {
-                for a in 0..WIDTH {
-                    add_scaled::<A>(&mut w.0, q[a], &c[a]);
-                }
+        }
+    }
+}
+
+/// W += Q C.
+#[inline(always)]
+fn update_panel<A: Arithmetic>(q: &[Row], c: &Small, w: &mut [Row]) {
+    let (tiles, rest) = w.as_chunks_mut::<8>();
+    let (q_tiles, q_rest) = q.as_chunks::<8>();
+    for (w, q) in tiles.iter_mut().zip(q_tiles) {
+        let mut sum = w.map(|row| row.0);
+        for a in 0..WIDTH {
+            for r in 0..8 {
+                add_scaled::<A>(&mut sum[r], q[r][a], &c[a]);
             }
+        }
+        *w = sum.map(Row);
+    }
+    for (w, q) in rest.iter_mut().zip(q_rest) {
+        for a in 0..WIDTH {
+            add_scaled::<A>(&mut w.0, q[a], &c[a]);
         }
     }
 }
@@ -196,10 +209,10 @@ pub(crate) mod dispatch {
     }
 
     dispatched! {
-        /// out[k] = Q_kᵀ W for each of the blocks.
-        gram = gram_with(blocks: &[&[Row]], w: &[Row], out: &mut [Small]);
-        /// W += Σ_k Q_k C_k.
-        update = update_with(blocks: &[&[Row]], c: &[Small], w: &mut [Row]);
+        /// Q_kᵀ W_i for every block k and every i, the latter running faster.
+        gram = gram_with(blocks: &[&[Row]], ws: &[&[Row]], out: &mut [Small]);
+        /// W_i += Σ_k Q_k C_ki, the C as `gram` returns them.
+        update = update_with(blocks: &[&[Row]], c: &[Small], ws: &mut [&mut [Row]]);
         /// Y = a·A X + b·X + c·Y for a sparse symmetric A.
         sparse = sparse_with(matrix: &Csr, x: &[Row], y: &mut [Row], abc: [f64; 3]);
         /// X = (L D Lᵀ)⁻¹ X; `x` has one row more than the matrix.
@@ -210,7 +223,7 @@ pub(crate) mod dispatch {
 /// Qᵀ W of two blocks.
 pub(crate) fn gram_of(q: &[Row], w: &[Row]) -> Small {
     let mut out = [SMALL_ZERO];
-    dispatch::gram(&[q], w, &mut out);
+    dispatch::gram(&[q], &[w], &mut out);
     out[0]
 }
 

@@ -283,6 +283,7 @@ impl Component {
                         top,
                         tolerance,
                         seed,
+                        partial: attempt == 0,
                     },
                     progress,
                 )

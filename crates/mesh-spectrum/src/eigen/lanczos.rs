@@ -6,8 +6,8 @@
 //! W = Op Q_j − Q_{j−1} R_jᵀ − Q_j α_j,  α_j = Q_jᵀ Op Q_j,  W = Q_{j+1} R_{j+1}.
 //!
 //! T is block tridiagonal with α on the diagonal and R below; T s = θ s gives the Ritz pair (θ, Q s) with the residual
-//! Op Q s − θ Q s = Q_{m+1} R_{m+1} s_last. Every new block is orthogonalised against all before it, so that no pair is
-//! found twice.
+//! Op Q s − θ Q s = Q_{m+1} R_{m+1} s_last. New blocks are orthogonalised against all before them, so that no pair is
+//! found twice: at every step, or when `omega` says that it is needed.
 
 use faer::{Mat, Side};
 use rand::{Rng, SeedableRng};
@@ -18,6 +18,7 @@ use crate::eigen::block::{
     transpose,
 };
 use crate::eigen::factor::Factor;
+use crate::eigen::omega::Omega;
 
 /// A Krylov space around one shift, growing by a block a step.
 pub(crate) struct Lanczos<'a> {
@@ -31,6 +32,8 @@ pub(crate) struct Lanczos<'a> {
     random: ChaCha8Rng,
     /// The largest |α| so far: an estimate of ‖Op‖ from below.
     scale: f64,
+    /// For partial reorthogonalisation; full without it.
+    omega: Option<Omega>,
 }
 
 /// Eigenpairs of T.
@@ -43,8 +46,8 @@ pub(crate) struct Ritz {
 }
 
 impl<'a> Lanczos<'a> {
-    /// Starts from eight random vectors.
-    pub(crate) fn new(factor: &'a Factor, n: usize, seed: u64) -> Lanczos<'a> {
+    /// Starts from eight random vectors. `partial`: orthogonalise only where needed.
+    pub(crate) fn new(factor: &'a Factor, n: usize, seed: u64, partial: bool) -> Lanczos<'a> {
         let mut lanczos = Lanczos {
             factor,
             n,
@@ -53,6 +56,7 @@ impl<'a> Lanczos<'a> {
             coupling: Vec::new(),
             random: ChaCha8Rng::seed_from_u64(seed),
             scale: 0.0,
+            omega: partial.then(|| Omega::new(seed ^ 1)),
         };
         let mut start = vec![ZERO; n];
         start
@@ -86,15 +90,15 @@ impl<'a> Lanczos<'a> {
         // rounding, and one pass is enough.
         if j > 0 {
             let back = negative(&transpose(&self.coupling[j - 1]));
-            dispatch::update(&[&self.basis[j - 1]], &[back], &mut w);
+            dispatch::update(&[&self.basis[j - 1]], &[back], &mut [&mut w]);
         }
         let mut alpha = gram_of(&self.basis[j], &w);
-        dispatch::update(&[&self.basis[j]], &[negative(&alpha)], &mut w);
-        let correction = self.orthogonalise(&mut w);
-        for a in 0..WIDTH {
-            for c in 0..WIDTH {
-                alpha[a][c] += correction[a][c];
-            }
+        dispatch::update(&[&self.basis[j]], &[negative(&alpha)], &mut [&mut w]);
+        if let Some(omega) = &mut self.omega {
+            omega.observe(&alpha);
+        } else {
+            let correction = self.orthogonalise(&mut w);
+            add(&mut alpha, &correction);
         }
         let turned = transpose(&alpha);
         for a in 0..WIDTH {
@@ -106,16 +110,38 @@ impl<'a> Lanczos<'a> {
         self.alpha.push(alpha);
         let r = self.orthonormalise(&mut w);
         self.coupling.push(r);
+        if let Some(mut omega) = self.omega.take() {
+            if let Some(estimated) = omega.step(&self.alpha, &self.coupling) {
+                let measured = self.repair(&mut w);
+                omega.repaired(estimated, measured);
+            }
+            self.omega = Some(omega);
+        }
         self.basis.push(w);
+    }
+
+    /// Orthogonalises the last block of the basis and W against all blocks before, and W against the last. Both together,
+    /// because a loss comes back from either. Returns the largest coefficient removed.
+    fn repair(&mut self, w: &mut Block) -> f64 {
+        let mut last = self.basis.pop().expect("a start block");
+        let blocks: Vec<&[Row]> = self.basis.iter().map(|block| &block[..]).collect();
+        let mut c = vec![SMALL_ZERO; 2 * blocks.len()];
+        dispatch::gram(&blocks, &[&last, w], &mut c);
+        c.iter_mut().for_each(|c| *c = negative(c));
+        dispatch::update(&blocks, &c, &mut [&mut last, w]);
+        let along = gram_of(&last, w);
+        dispatch::update(&[&last], &[negative(&along)], &mut [w]);
+        self.basis.push(last);
+        c.iter().flatten().flatten().fold(0.0, |most, x| most.max(x.abs()))
     }
 
     /// W −= Q Qᵀ W over the whole basis; returns the last block's coefficients.
     fn orthogonalise(&self, w: &mut [Row]) -> Small {
         let blocks: Vec<&[Row]> = self.basis.iter().map(|block| &block[..]).collect();
         let mut c = vec![SMALL_ZERO; blocks.len()];
-        dispatch::gram(&blocks, w, &mut c);
+        dispatch::gram(&blocks, &[w], &mut c);
         c.iter_mut().for_each(|c| *c = negative(c));
-        dispatch::update(&blocks, &c, w);
+        dispatch::update(&blocks, &c, &mut [w]);
         c.last().map_or(SMALL_ZERO, negative)
     }
 
@@ -134,7 +160,7 @@ impl<'a> Lanczos<'a> {
                 break; // an invariant subspace: what is left of W is rounding
             }
             let mut q = vec![ZERO; self.n];
-            dispatch::update(&[&*w], &[inverse], &mut q);
+            dispatch::update(&[&*w], &[inverse], &mut [&mut q]);
             *w = q;
             total = Some(total.map_or(r, |total| product(&r, &total)));
             if most / least < 50.0 {
@@ -263,11 +289,15 @@ impl<'a> Lanczos<'a> {
                     }
                 }
                 let mut x = vec![ZERO; self.n];
-                dispatch::update(&blocks, &c, &mut x);
+                dispatch::update(&blocks, &c, &mut [&mut x]);
                 x
             })
             .collect()
     }
+}
+
+fn add(sum: &mut Small, term: &Small) {
+    sum.iter_mut().flatten().zip(term.iter().flatten()).for_each(|(sum, term)| *sum += term);
 }
 
 fn norm_of(block: &[Row], column: usize) -> f64 {
@@ -279,6 +309,6 @@ fn norm_of(block: &[Row], column: usize) -> f64 {
 }
 
 /// Uniform in [−½, ½).
-fn uniform(random: &mut ChaCha8Rng) -> f64 {
+pub(crate) fn uniform(random: &mut ChaCha8Rng) -> f64 {
     (random.next_u64() >> 11) as f64 / (1u64 << 53) as f64 - 0.5
 }

@@ -12,6 +12,7 @@ mod component;
 mod factor;
 mod finish;
 mod lanczos;
+mod omega;
 mod slice;
 pub(crate) mod solve;
 mod spectrum;

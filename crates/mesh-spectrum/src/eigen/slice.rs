@@ -22,6 +22,8 @@ pub(crate) struct Demand {
     pub(crate) tolerance: f64,
     /// For the random start.
     pub(crate) seed: u64,
+    /// Orthogonalise only where needed; the second attempt does it always.
+    pub(crate) partial: bool,
 }
 
 /// The pairs of a slice, ascending.
@@ -56,7 +58,7 @@ pub(crate) fn slice(
     progress: &Progress,
 ) -> Result<Slice, Trouble> {
     let Demand {
-        left, right, seed, ..
+        left, right, seed, partial, ..
     } = demand;
     let mut found = Slice {
         first: factor.below - left,
@@ -67,7 +69,7 @@ pub(crate) fn slice(
         return Ok(found);
     }
     let n = matrix.rows();
-    let mut lanczos = Lanczos::new(factor, n, seed);
+    let mut lanczos = Lanczos::new(factor, n, seed, partial);
     // Measured on sheet meshes. A space a little too large costs a step, one too small another projected problem.
     let mut next = 90 + 5 * (left + right) / 2 + left.max(right);
     let (ritz, chosen) = loop {
@@ -110,6 +112,10 @@ pub(crate) fn slice(
     if residual(matrix, &found) > 0.5 * allowed {
         polish(matrix, &mut found);
         normalise(&mut found.vectors);
+        let left = residual(matrix, &found);
+        if left > allowed && partial {
+            return Err(Trouble::Again(format!("residual {left:e}, {allowed:e} allowed")));
+        }
     }
     progress.add(chosen.len());
     Ok(found)
