@@ -19,10 +19,10 @@ pub(crate) struct BasisArgs {
     pub(crate) parts: Vec<String>,
     /// Treat separate sheets as one: mutually nearest vertices of different pieces of the mesh that are closer than this
     /// (length unit of the model) share one degree of freedom. `init` recommends a distance where sheets lie close
-    #[arg(long, value_name = "DISTANCE")]
+    #[arg(long, value_name = "DISTANCE", allow_negative_numbers = true)]
     join: Option<f64>,
     /// Eigenpairs K of the basis, 1 or more; each costs time and space, and resolves finer folds [default: 500]
-    #[arg(short = 'K', long, value_name = "K")]
+    #[arg(short = 'K', long, value_name = "K", allow_negative_numbers = true)]
     eigenpairs: Option<usize>,
 }
 
@@ -57,10 +57,10 @@ impl AddArgs {
 #[derive(Args)]
 pub(crate) struct ModesArgs {
     /// Number of modes, 1 or more [default: the number from 2 to 8 with the best mean silhouette]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     count: Option<usize>,
     /// Seed of the random starts; the same seed gives the same modes [default: 1]
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     seed: Option<u64>,
     /// How to group: kmeans, ward or average [default: kmeans]
     #[arg(long, value_name = "METHOD")]

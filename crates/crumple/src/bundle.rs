@@ -17,7 +17,16 @@ pub struct Found {
     /// Path of the root file.
     pub path: PathBuf,
     /// Why it cannot be a run although its name says so; such files are reported, not passed over.
-    pub fault: Option<String>,
+    pub fault: Option<Fault>,
+}
+
+/// Why a file cannot be a run.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Fault {
+    /// What is wrong, with the file's path.
+    pub what: String,
+    /// What to do about it.
+    pub remedy: Option<String>,
 }
 
 /// Folders deeper than this below the one given are not searched.
@@ -123,7 +132,7 @@ impl Search<'_> {
         self.found.extend(roots.refused.iter().map(|refused| Found {
             id: id(&refused.path),
             path: refused.path.clone(),
-            fault: Some(refused.error.to_string()),
+            fault: Some(Fault { what: refused.error.to_string(), remedy: refused.error.remedy() }),
         }));
         subfolders.sort();
         subfolders.iter().try_for_each(|folder| self.visit(folder, depth + 1))

@@ -179,7 +179,7 @@ fn judge_query(
     threshold: Threshold,
 ) -> Result<Vec<Row>, Error> {
     let named = Named { run: rows.runs[query.medoid].clone(), state: None };
-    let described = describe(loaded, &named, None, "compare", &DescribeOptions { select, threshold })?;
+    let described = describe(loaded, &named, None, None, &DescribeOptions { select, threshold })?;
     let values = Values::of(loaded, rows, select);
     let m = described.descriptor.eigenvectors.len();
     let mut methods = vec![

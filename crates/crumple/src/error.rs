@@ -12,6 +12,14 @@ pub enum Error {
     /// A result file could not be read.
     #[error("{0}")]
     Read(#[from] d3plot::Error),
+    /// A file whose name says that it is a run and whose content does not.
+    #[error("{what}")]
+    Refused {
+        /// What is wrong, with the file's path.
+        what: String,
+        /// What to do about it.
+        remedy: Option<String>,
+    },
     /// A path that does not exist.
     #[error("{}: no such file or folder", .0.display())]
     NoSuchPath(PathBuf),
@@ -287,6 +295,7 @@ impl Error {
     pub fn remedy(&self) -> Option<String> {
         let text = match self {
             Self::Read(error) => return error.remedy(),
+            Self::Refused { remedy, .. } => return remedy.clone(),
             Self::NoSuchPath(_) => "check the spelling; a run is the root file of a family or its folder",
             Self::NoRuns { .. } => "give the folder that holds the runs, or a run's root file (d3plot)",
             Self::BadRuns { .. } => "mend or remove these runs, or go on without them: --skip-bad",

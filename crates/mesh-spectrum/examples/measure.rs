@@ -13,18 +13,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let words: Vec<&str> = line.split_whitespace().collect();
         match words[..] {
             ["v", x, y, z] => vertices.push([x.parse()?, y.parse()?, z.parse()?]),
-            ["f", a, b, c] => faces.push([
-                a.parse::<u32>()? - 1,
-                b.parse::<u32>()? - 1,
-                c.parse::<u32>()? - 1,
-                c.parse::<u32>()? - 1,
-            ]),
-            ["f", a, b, c, d] => faces.push([
-                a.parse::<u32>()? - 1,
-                b.parse::<u32>()? - 1,
-                c.parse::<u32>()? - 1,
-                d.parse::<u32>()? - 1,
-            ]),
+            ["f", a, b, c] => {
+                faces.push([a.parse::<u32>()? - 1, b.parse::<u32>()? - 1, c.parse::<u32>()? - 1, c.parse::<u32>()? - 1])
+            }
+            ["f", a, b, c, d] => {
+                faces.push([a.parse::<u32>()? - 1, b.parse::<u32>()? - 1, c.parse::<u32>()? - 1, d.parse::<u32>()? - 1])
+            }
             _ => {}
         }
     }
@@ -39,23 +33,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     );
     let start = Instant::now();
     let operator = operator(&mesh, &OperatorOptions { join })?;
-    println!(
-        "operator {:.4} s, {} dofs",
-        start.elapsed().as_secs_f64(),
-        operator.mass.len()
-    );
+    println!("operator {:.4} s, {} dofs", start.elapsed().as_secs_f64(), operator.mass.len());
     let mut times = Vec::new();
     let mut last = None;
     for _ in 0..repeats {
         let start = Instant::now();
-        last = Some(eigenbasis(
-            &operator,
-            &EigenOptions {
-                count,
-                ..Default::default()
-            },
-            &(),
-        )?);
+        last = Some(eigenbasis(&operator, &EigenOptions { count, ..Default::default() }, &())?);
         times.push(start.elapsed().as_secs_f64());
     }
     times.sort_by(f64::total_cmp);

@@ -42,22 +42,14 @@ pub struct Inspection {
 pub fn inspect(mesh: &Mesh) -> Inspection {
     let vertices = mesh.vertices();
     let (component_of_vertex, components) = components(mesh);
-    let areas: Vec<Option<f64>> = mesh
-        .triangles()
-        .iter()
-        .map(|&t| double_area(mesh.corners(t)))
-        .collect();
+    let areas: Vec<Option<f64>> = mesh.triangles().iter().map(|&t| double_area(mesh.corners(t))).collect();
 
     let mut used = vec![false; vertices.len()];
-    mesh.triangles()
-        .iter()
-        .flatten()
-        .for_each(|&vertex| used[vertex as usize] = true);
+    mesh.triangles().iter().flatten().for_each(|&vertex| used[vertex as usize] = true);
 
     let length = |[a, b]: [u32; 2]| norm(sub(vertices[a as usize], vertices[b as usize]));
     let edges = edges(mesh);
-    let edge_length_mean =
-        edges.iter().map(|(edge, _)| length(*edge)).sum::<f64>() / edges.len().max(1) as f64;
+    let edge_length_mean = edges.iter().map(|(edge, _)| length(*edge)).sum::<f64>() / edges.len().max(1) as f64;
 
     let gap_median = (components > 1 && edge_length_mean > 0.0)
         .then(|| mutual_pairs(vertices, &component_of_vertex, 0.5 * edge_length_mean))
@@ -69,11 +61,7 @@ pub fn inspect(mesh: &Mesh) -> Inspection {
 
     Inspection {
         area: 0.5 * areas.iter().flatten().sum::<f64>(),
-        boundary_length: edges
-            .iter()
-            .filter(|(_, faces)| *faces == 1)
-            .map(|(edge, _)| length(*edge))
-            .sum(),
+        boundary_length: edges.iter().filter(|(_, faces)| *faces == 1).map(|(edge, _)| length(*edge)).sum(),
         components,
         component_of_vertex,
         triangles_without_area: areas.iter().filter(|area| area.is_none()).count(),
@@ -98,12 +86,8 @@ pub(crate) fn components(mesh: &Mesh) -> (Vec<u32>, usize) {
 }
 
 pub(crate) fn longest_edge(mesh: &Mesh) -> f64 {
-    let longest =
-        |[a, b, c]: [[f64; 3]; 3]| norm(sub(a, b)).max(norm(sub(b, c))).max(norm(sub(c, a)));
-    mesh.triangles()
-        .iter()
-        .map(|&t| longest(mesh.corners(t)))
-        .fold(0.0, f64::max)
+    let longest = |[a, b, c]: [[f64; 3]; 3]| norm(sub(a, b)).max(norm(sub(b, c))).max(norm(sub(c, a)));
+    mesh.triangles().iter().map(|&t| longest(mesh.corners(t))).fold(0.0, f64::max)
 }
 
 /// Every different edge, lower vertex first, with its number of triangles.
@@ -117,9 +101,7 @@ fn edges(mesh: &Mesh) -> Vec<([u32; 2], usize)> {
         }
     }
     all.sort_unstable();
-    all.chunk_by(|a, b| a == b)
-        .map(|same| (same[0], same.len()))
-        .collect()
+    all.chunk_by(|a, b| a == b).map(|same| (same[0], same.len())).collect()
 }
 
 /// The next number of two significant digits at or above `x`. Vertices that coincide (x = 0) are joined at a
@@ -129,11 +111,7 @@ fn round_up(x: f64, edge: f64) -> f64 {
     let unit = 10f64.powf(x.log10().floor() - 1.0);
     // 1e-9: 2.5 may be stored as 25.000000000000004 units; dividing by 1/unit keeps 2.5 itself exact.
     let digits = (x / unit - 1e-9).ceil();
-    if unit < 1.0 {
-        digits / (1.0 / unit).round()
-    } else {
-        digits * unit
-    }
+    if unit < 1.0 { digits / (1.0 / unit).round() } else { digits * unit }
 }
 
 #[cfg(test)]
@@ -147,41 +125,18 @@ mod tests {
         vertices.push([99.0; 3]);
         vertices.extend(triangle(2.0));
         let seen = inspect(&Mesh::new(vertices, vec![[0, 1, 2], [4, 5, 6], [4, 5, 4]]).unwrap());
-        assert_eq!(
-            (seen.components, seen.component_of_vertex),
-            (3, vec![0, 0, 0, 1, 2, 2, 2])
-        );
-        assert_eq!(
-            (
-                seen.triangles_without_area,
-                seen.unused_vertices,
-                seen.non_manifold_edges
-            ),
-            (1, 1, 1)
-        );
+        assert_eq!((seen.components, seen.component_of_vertex), (3, vec![0, 0, 0, 1, 2, 2, 2]));
+        assert_eq!((seen.triangles_without_area, seen.unused_vertices, seen.non_manifold_edges), (1, 1, 1));
         assert!((seen.area - 100.0).abs() < 1e-12);
         // One triangle's boundary is 20 + 10√2; the other has its edge 4-5 three times (twice from the flat triangle).
-        assert!(
-            (seen.boundary_length - (20.0 + 200f64.sqrt()) - (10.0 + 200f64.sqrt())).abs() < 1e-12
-        );
+        assert!((seen.boundary_length - (20.0 + 200f64.sqrt()) - (10.0 + 200f64.sqrt())).abs() < 1e-12);
         assert_eq!((seen.gap_median, seen.gap), (Some(2.0), Some(2.5)));
     }
 
     #[test]
     fn two_digits_upwards() {
-        for (x, up) in [
-            (2.5, 2.5),
-            (2.51, 2.6),
-            (0.01234, 0.013),
-            (0.125, 0.13),
-            (990.0, 990.0),
-            (991.0, 1000.0),
-        ] {
-            assert!(
-                (round_up(x, 1.0) / up - 1.0).abs() < 1e-14,
-                "{x} became {}",
-                round_up(x, 1.0)
-            );
+        for (x, up) in [(2.5, 2.5), (2.51, 2.6), (0.01234, 0.013), (0.125, 0.13), (990.0, 990.0), (991.0, 1000.0)] {
+            assert!((round_up(x, 1.0) / up - 1.0).abs() < 1e-14, "{x} became {}", round_up(x, 1.0));
         }
     }
 }

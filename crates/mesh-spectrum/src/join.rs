@@ -63,11 +63,7 @@ pub fn join(mesh: &Mesh, distance: f64) -> Result<Join, JoinError> {
         union.merge(pair.low, pair.high);
     }
     let (dof_of_vertex, dofs) = union.classes();
-    Ok(Join {
-        dof_of_vertex,
-        dofs,
-        pairs: pairs.len(),
-    })
+    Ok(Join { dof_of_vertex, dofs, pairs: pairs.len() })
 }
 
 #[cfg(test)]
@@ -77,29 +73,13 @@ mod tests {
     #[test]
     fn only_mutual_pairs_of_different_components_are_joined() {
         // Two triangles 1 apart in z; the second one's last vertex is shifted out of reach.
-        let vertices = vec![
-            [0.0, 0.0, 0.0],
-            [4.0, 0.0, 0.0],
-            [0.0, 4.0, 0.0],
-            [0.0, 0.0, 1.0],
-            [4.0, 0.0, 1.0],
-            [0.0, 9.0, 1.0],
-        ];
+        let vertices =
+            vec![[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 1.0], [4.0, 0.0, 1.0], [0.0, 9.0, 1.0]];
         let mesh = Mesh::new(vertices, vec![[0, 1, 2], [3, 4, 5]]).unwrap();
         let joined = join(&mesh, 1.0).unwrap();
-        assert_eq!(
-            joined,
-            Join {
-                dof_of_vertex: vec![0, 1, 2, 0, 1, 3],
-                dofs: 4,
-                pairs: 2
-            }
-        );
+        assert_eq!(joined, Join { dof_of_vertex: vec![0, 1, 2, 0, 1, 3], dofs: 4, pairs: 2 });
         assert_eq!(join(&mesh, 0.9).unwrap().pairs, 0);
-        assert!(matches!(
-            join(&mesh, f64::NAN),
-            Err(JoinError::Distance { .. })
-        ));
+        assert!(matches!(join(&mesh, f64::NAN), Err(JoinError::Distance { .. })));
         assert!(matches!(join(&mesh, 1e3), Err(JoinError::TooFar { .. })));
     }
 }

@@ -36,9 +36,7 @@ mod mesh;
 mod operator;
 mod proximity;
 
-pub use eigen::{
-    Certificate, EigenError, EigenOptions, Eigenbasis, InertiaCount, Method, Watch, eigenbasis,
-};
+pub use eigen::{Certificate, EigenError, EigenOptions, Eigenbasis, InertiaCount, Method, Watch, eigenbasis};
 pub use inspect::{Inspection, inspect};
 pub use join::{Join, JoinError, join};
 pub use mesh::{Mesh, MeshError};

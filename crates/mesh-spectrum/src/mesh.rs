@@ -44,9 +44,7 @@ pub enum MeshError {
         point: [f64; 3],
     },
     /// There is no face with three different vertices.
-    #[error(
-        "no triangle: a mesh needs at least one face with three different vertices ({faces} faces given)"
-    )]
+    #[error("no triangle: a mesh needs at least one face with three different vertices ({faces} faces given)")]
     NoTriangle {
         /// How many faces were given.
         faces: usize,
@@ -72,12 +70,7 @@ impl Mesh {
             return Err(MeshError::NoTriangle { faces: 0 });
         }
         let face_of_triangle = (0..triangles.len() as u32).collect();
-        Ok(Mesh {
-            vertices,
-            triangles,
-            face_of_triangle,
-            faces_left_out: 0,
-        })
+        Ok(Mesh { vertices, triangles, face_of_triangle, faces_left_out: 0 })
     }
 
     /// A mesh of triangles and quadrilaterals, as shell elements come: `[a, b, c, d]` in order around the face,
@@ -112,12 +105,7 @@ impl Mesh {
         if triangles.is_empty() {
             return Err(MeshError::NoTriangle { faces: faces.len() });
         }
-        Ok(Mesh {
-            vertices,
-            triangles,
-            face_of_triangle,
-            faces_left_out,
-        })
+        Ok(Mesh { vertices, triangles, face_of_triangle, faces_left_out })
     }
 
     /// N vertices, in the model's length unit.
@@ -146,35 +134,19 @@ impl Mesh {
     }
 }
 
-fn check<const CORNERS: usize>(
-    vertices: &[Point],
-    faces: &[[u32; CORNERS]],
-) -> Result<(), MeshError> {
+fn check<const CORNERS: usize>(vertices: &[Point], faces: &[[u32; CORNERS]]) -> Result<(), MeshError> {
     // Half the range of u32, because two triangles may come from a face.
     for (what, given) in [("vertices", vertices.len()), ("faces", faces.len())] {
         if given > u32::MAX as usize / 2 {
             return Err(MeshError::TooMany { what, given });
         }
     }
-    if let Some(vertex) = vertices
-        .iter()
-        .position(|point| !point.iter().all(|x| x.is_finite()))
-    {
-        return Err(MeshError::NotFinite {
-            vertex,
-            point: vertices[vertex],
-        });
+    if let Some(vertex) = vertices.iter().position(|point| !point.iter().all(|x| x.is_finite())) {
+        return Err(MeshError::NotFinite { vertex, point: vertices[vertex] });
     }
     for (face, corners) in faces.iter().enumerate() {
-        if let Some(&vertex) = corners
-            .iter()
-            .find(|&&corner| corner as usize >= vertices.len())
-        {
-            return Err(MeshError::VertexOutOfRange {
-                face,
-                vertex,
-                vertices: vertices.len(),
-            });
+        if let Some(&vertex) = corners.iter().find(|&&corner| corner as usize >= vertices.len()) {
+            return Err(MeshError::VertexOutOfRange { face, vertex, vertices: vertices.len() });
         }
     }
     Ok(())
@@ -188,11 +160,7 @@ fn split(vertices: &[Point], [a, b, c, d]: [u32; 4]) -> [[u32; 3]; 2] {
     };
     let along_ac = [[a, b, c], [a, c, d]];
     let along_bd = [[a, b, d], [b, c, d]];
-    if smallest(along_bd) > smallest(along_ac) + 1e-9 {
-        along_bd
-    } else {
-        along_ac
-    }
+    if smallest(along_bd) > smallest(along_ac) + 1e-9 { along_bd } else { along_ac }
 }
 
 /// The smallest angle of a triangle, in radians; 0 where an edge has no length.
@@ -213,11 +181,7 @@ pub(crate) fn dot(a: Point, b: Point) -> f64 {
 }
 
 pub(crate) fn cross(a: Point, b: Point) -> Point {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 pub(crate) fn norm(a: Point) -> f64 {
@@ -281,12 +245,7 @@ mod tests {
     #[test]
     fn a_quadrilateral_is_split_along_the_better_diagonal() {
         // A kite, long in x: the diagonal b-d (short, through the middle) leaves angles of 53°, a-c leaves 14°.
-        let kite = vec![
-            [-2.0, 0.0, 0.0],
-            [0.0, -1.0, 0.0],
-            [2.0, 0.0, 0.0],
-            [0.0, 1.0, 0.0],
-        ];
+        let kite = vec![[-2.0, 0.0, 0.0], [0.0, -1.0, 0.0], [2.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
         let mesh = Mesh::from_faces(kite, &[[0, 1, 2, 3]]).unwrap();
         assert_eq!(mesh.triangles(), [[0, 1, 3], [1, 2, 3]]);
         assert_eq!(mesh.face_of_triangle(), [0, 0]);
@@ -294,36 +253,21 @@ mod tests {
 
     #[test]
     fn faces_with_repeated_vertices() {
-        let square = vec![
-            [0.0, 0.0, 0.0],
-            [1.0, 0.0, 0.0],
-            [1.0, 1.0, 0.0],
-            [0.0, 1.0, 0.0],
-        ];
-        let mesh =
-            Mesh::from_faces(square.clone(), &[[0, 0, 1, 1], [0, 1, 2, 2], [0, 1, 2, 3]]).unwrap();
+        let square = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+        let mesh = Mesh::from_faces(square.clone(), &[[0, 0, 1, 1], [0, 1, 2, 2], [0, 1, 2, 3]]).unwrap();
         assert_eq!(mesh.triangles(), [[0, 1, 2], [0, 1, 2], [0, 2, 3]]);
         assert_eq!(mesh.face_of_triangle(), [1, 2, 2]);
         assert_eq!(mesh.faces_left_out(), 1);
-        assert_eq!(
-            Mesh::from_faces(square, &[[0, 0, 1, 1]]),
-            Err(MeshError::NoTriangle { faces: 1 })
-        );
+        assert_eq!(Mesh::from_faces(square, &[[0, 0, 1, 1]]), Err(MeshError::NoTriangle { faces: 1 }));
     }
 
     #[test]
     fn errors_name_the_place() {
         let corner = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
         let error = Mesh::new(corner.clone(), vec![[0, 1, 2], [0, 1, 7]]).unwrap_err();
-        assert_eq!(
-            error.to_string(),
-            "face 1: vertex 7 does not exist, there are 3 (numbered from 0)"
-        );
+        assert_eq!(error.to_string(), "face 1: vertex 7 does not exist, there are 3 (numbered from 0)");
         let mut broken = corner;
         broken[2][1] = f64::NAN;
-        assert!(matches!(
-            Mesh::new(broken, vec![[0, 1, 2]]),
-            Err(MeshError::NotFinite { vertex: 2, .. })
-        ));
+        assert!(matches!(Mesh::new(broken, vec![[0, 1, 2]]), Err(MeshError::NotFinite { vertex: 2, .. })));
     }
 }

@@ -61,9 +61,7 @@ pub struct Csr {
 #[non_exhaustive]
 pub enum OperatorError {
     /// A vertex belongs to no triangle with area, so nothing determines a field there.
-    #[error(
-        "vertex {vertex}: no triangle with area uses it; drop such vertices before building the operator"
-    )]
+    #[error("vertex {vertex}: no triangle with area uses it; drop such vertices before building the operator")]
     NoMass {
         /// The lowest such vertex, numbered from 0.
         vertex: usize,
@@ -86,17 +84,9 @@ pub enum OperatorError {
 pub fn operator(mesh: &Mesh, options: &OperatorOptions) -> Result<Operator, OperatorError> {
     let &OperatorOptions { join: distance } = options;
     let vertices = mesh.vertices().len();
-    let Join {
-        dof_of_vertex,
-        dofs,
-        pairs,
-    } = match distance {
+    let Join { dof_of_vertex, dofs, pairs } = match distance {
         Some(distance) => join(mesh, distance)?,
-        None => Join {
-            dof_of_vertex: (0..vertices as u32).collect(),
-            dofs: vertices,
-            pairs: 0,
-        },
+        None => Join { dof_of_vertex: (0..vertices as u32).collect(), dofs: vertices, pairs: 0 },
     };
 
     let mut vertex_mass = vec![0.0; vertices];
@@ -118,12 +108,7 @@ pub fn operator(mesh: &Mesh, options: &OperatorOptions) -> Result<Operator, Oper
             // The edge opposite to corner k.
             let (i, j) = (dof[(k + 1) % 3], dof[(k + 2) % 3]);
             let weight = 0.5 * cot[k];
-            entries.extend([
-                (i, j, -weight),
-                (j, i, -weight),
-                (i, i, weight),
-                (j, j, weight),
-            ]);
+            entries.extend([(i, j, -weight), (j, i, -weight), (i, i, weight), (j, j, weight)]);
             vertex_mass[triangle[k] as usize] += double_area / 6.0;
             connected.merge(i, j);
         }
@@ -153,11 +138,7 @@ pub fn operator(mesh: &Mesh, options: &OperatorOptions) -> Result<Operator, Oper
 /// |u×v|, twice the area, is the same at all three corners.
 pub(crate) fn cotangents([a, b, c]: [Point; 3], double_area: f64) -> [f64; 3] {
     let cot = |u, v| dot(u, v) / double_area;
-    [
-        cot(sub(b, a), sub(c, a)),
-        cot(sub(c, b), sub(a, b)),
-        cot(sub(a, c), sub(b, c)),
-    ]
+    [cot(sub(b, a), sub(c, a)), cot(sub(c, b), sub(a, b)), cot(sub(a, c), sub(b, c))]
 }
 
 impl Csr {
@@ -165,11 +146,7 @@ impl Csr {
     /// depend on how they are sorted, and the result is exactly symmetric if the entries come in symmetric pairs.
     pub(crate) fn from_entries(rows: usize, mut entries: Vec<(u32, u32, f64)>) -> Csr {
         entries.sort_by_key(|&(row, column, _)| (row, column)); // stable
-        let mut matrix = Csr {
-            start: vec![0; rows + 1],
-            columns: Vec::new(),
-            values: Vec::new(),
-        };
+        let mut matrix = Csr { start: vec![0; rows + 1], columns: Vec::new(), values: Vec::new() };
         for same in entries.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
             matrix.start[same[0].0 as usize + 1] += 1;
             matrix.columns.push(same[0].1);
@@ -189,10 +166,7 @@ impl Csr {
     /// (column, value) of each entry of a row.
     pub fn row(&self, row: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         let range = self.start[row]..self.start[row + 1];
-        self.columns[range.clone()]
-            .iter()
-            .zip(&self.values[range])
-            .map(|(&column, &value)| (column as usize, value))
+        self.columns[range.clone()].iter().zip(&self.values[range]).map(|(&column, &value)| (column as usize, value))
     }
 
     /// The product with a vector of as many entries as there are rows.
@@ -200,9 +174,7 @@ impl Csr {
     /// # Panics
     /// If `x` is shorter.
     pub fn times(&self, x: &[f64]) -> Vec<f64> {
-        (0..self.rows())
-            .map(|row| self.row(row).map(|(column, value)| value * x[column]).sum())
-            .collect()
+        (0..self.rows()).map(|row| self.row(row).map(|(column, value)| value * x[column]).sum()).collect()
     }
 }
 
@@ -216,40 +188,24 @@ mod tests {
         for c in [[0.3, 2.0, 0.0], [5.0, 0.01, -3.0], [-1.0, 0.2, 4.0]] {
             let corners = [[0.1, 0.0, 0.5], [1.0, 0.2, 0.0], c];
             let [x, y, z] = cotangents(corners, double_area(corners).unwrap());
-            assert!(
-                (x * y + y * z + z * x - 1.0).abs() < 1e-12,
-                "rounding only: angles are above 0.01 rad"
-            );
+            assert!((x * y + y * z + z * x - 1.0).abs() < 1e-12, "rounding only: angles are above 0.01 rad");
         }
     }
 
     #[test]
     fn stiffness_of_one_right_angled_triangle() {
         // Legs of length 1: cot = 0 at the right angle, 1 at the others.
-        let mesh = Mesh::new(
-            vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
-            vec![[0, 1, 2]],
-        )
-        .unwrap();
+        let mesh = Mesh::new(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], vec![[0, 1, 2]]).unwrap();
         let built = operator(&mesh, &OperatorOptions::default()).unwrap();
-        assert_eq!(
-            built.stiffness.values,
-            [1.0, -0.5, -0.5, -0.5, 0.5, 0.0, -0.5, 0.0, 0.5]
-        );
+        assert_eq!(built.stiffness.values, [1.0, -0.5, -0.5, -0.5, 0.5, 0.0, -0.5, 0.0, 0.5]);
         assert_eq!(built.mass, [1.0 / 6.0; 3]);
     }
 
     #[test]
     fn a_triangle_without_area_connects_nothing() {
         // Two triangles and a flat one that bridges them: constants on either side cost no energy.
-        let vertices = vec![
-            [0.0; 3],
-            [1.0, 0.0, 0.0],
-            [0.0, 1.0, 0.0],
-            [2.0, 0.0, 0.0],
-            [3.0, 0.0, 0.0],
-            [2.0, 1.0, 0.0],
-        ];
+        let vertices =
+            vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [2.0, 0.0, 0.0], [3.0, 0.0, 0.0], [2.0, 1.0, 0.0]];
         let mesh = Mesh::new(vertices, vec![[0, 1, 2], [3, 4, 5], [0, 1, 3]]).unwrap();
         let built = operator(&mesh, &OperatorOptions::default()).unwrap();
         assert_eq!((built.components, built.triangles_without_area), (2, 1));
@@ -257,14 +213,7 @@ mod tests {
 
     #[test]
     fn a_vertex_without_mass_is_named() {
-        let mesh = Mesh::new(
-            vec![[0.0; 3], [1.0, 0.0, 0.0], [9.0; 3], [0.0, 1.0, 0.0]],
-            vec![[0, 1, 3]],
-        )
-        .unwrap();
-        assert_eq!(
-            operator(&mesh, &OperatorOptions::default()),
-            Err(OperatorError::NoMass { vertex: 2 })
-        );
+        let mesh = Mesh::new(vec![[0.0; 3], [1.0, 0.0, 0.0], [9.0; 3], [0.0, 1.0, 0.0]], vec![[0, 1, 3]]).unwrap();
+        assert_eq!(operator(&mesh, &OperatorOptions::default()), Err(OperatorError::NoMass { vertex: 2 }));
     }
 }

@@ -16,11 +16,7 @@ pub(crate) struct Pair {
 
 /// All mutually nearest pairs at most `radius` apart, in the order of their lower vertex.
 /// Of several vertices at the same distance the lowest is the nearest, so the result is unique.
-pub(crate) fn mutual_pairs(
-    vertices: &[Point],
-    component_of_vertex: &[u32],
-    radius: f64,
-) -> Vec<Pair> {
+pub(crate) fn mutual_pairs(vertices: &[Point], component_of_vertex: &[u32], radius: f64) -> Vec<Pair> {
     let grid = Grid::new(vertices, radius);
     let nearest: Vec<Option<(u32, f64)>> = (0..vertices.len())
         .map(|vertex| grid.nearest_elsewhere(vertices, component_of_vertex, vertex, radius))
@@ -31,11 +27,7 @@ pub(crate) fn mutual_pairs(
             && other as usize > vertex
             && nearest[other as usize].is_some_and(|(back, _)| back as usize == vertex)
         {
-            pairs.push(Pair {
-                low: vertex as u32,
-                high: other,
-                distance,
-            });
+            pairs.push(Pair { low: vertex as u32, high: other, distance });
         }
     }
     pairs
@@ -56,16 +48,9 @@ impl Grid {
                 origin[axis] = origin[axis].min(point[axis]);
             }
         }
-        let mut grid = Grid {
-            origin,
-            width,
-            cells: HashMap::new(),
-        };
+        let mut grid = Grid { origin, width, cells: HashMap::new() };
         for (vertex, &point) in vertices.iter().enumerate() {
-            grid.cells
-                .entry(grid.cell(point))
-                .or_default()
-                .push(vertex as u32);
+            grid.cells.entry(grid.cell(point)).or_default().push(vertex as u32);
         }
         grid
     }
@@ -86,20 +71,14 @@ impl Grid {
         let home = self.cell(vertices[vertex]);
         let mut best: Option<(u32, f64)> = None;
         for step in 0..27 {
-            let cell = [
-                home[0] + step % 3 - 1,
-                home[1] + step / 3 % 3 - 1,
-                home[2] + step / 9 - 1,
-            ];
+            let cell = [home[0] + step % 3 - 1, home[1] + step / 3 % 3 - 1, home[2] + step / 9 - 1];
             for &other in self.cells.get(&cell).into_iter().flatten() {
                 if component_of_vertex[other as usize] == component_of_vertex[vertex] {
                     continue;
                 }
                 let between = sub(vertices[other as usize], vertices[vertex]);
                 let distance = dot(between, between).sqrt();
-                let better = best.is_none_or(|(old, least)| {
-                    distance < least || (distance == least && other < old)
-                });
+                let better = best.is_none_or(|(old, least)| distance < least || (distance == least && other < old));
                 if distance <= radius && better {
                     best = Some((other, distance));
                 }

@@ -6,35 +6,22 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-use mesh_spectrum::{
-    EigenError, EigenOptions, Mesh, OperatorOptions, Watch, eigenbasis, inspect, join, operator,
-};
+use mesh_spectrum::{EigenError, EigenOptions, Mesh, OperatorOptions, Watch, eigenbasis, inspect, join, operator};
 use proptest::prelude::*;
 use zoo::{build, copies, rough};
 
 #[test]
 fn the_same_bytes_at_any_number_of_threads() {
     let built = build(copies(&rough(40, 25), 2, 40.0));
-    let options = EigenOptions {
-        count: 200,
-        ..Default::default()
-    };
+    let options = EigenOptions { count: 200, ..Default::default() };
     let solve = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| eigenbasis(&built, &options, &()).unwrap())
     };
     let one = solve(1);
     for threads in [1, 2, 5] {
         let other = solve(threads);
-        assert!(
-            one.eigenvectors
-                .iter()
-                .zip(&other.eigenvectors)
-                .all(|(a, b)| a.to_bits() == b.to_bits())
-        );
+        assert!(one.eigenvectors.iter().zip(&other.eigenvectors).all(|(a, b)| a.to_bits() == b.to_bits()));
         assert_eq!(one, other);
     }
 }
@@ -56,22 +43,10 @@ fn stopping_stops() {
     let built = build(rough(60, 50));
     for at in [1, 3, 40] {
         let start = Instant::now();
-        let stopper = Stopper {
-            asked: AtomicUsize::new(0),
-            at,
-        };
-        let options = EigenOptions {
-            count: 400,
-            ..Default::default()
-        };
-        assert_eq!(
-            eigenbasis(&built, &options, &stopper),
-            Err(EigenError::Stopped)
-        );
-        assert!(
-            start.elapsed().as_secs_f64() < 1.0,
-            "a promise of the documentation, at 3 111 vertices"
-        );
+        let stopper = Stopper { asked: AtomicUsize::new(0), at };
+        let options = EigenOptions { count: 400, ..Default::default() };
+        assert_eq!(eigenbasis(&built, &options, &stopper), Err(EigenError::Stopped));
+        assert!(start.elapsed().as_secs_f64() < 1.0, "a promise of the documentation, at 3 111 vertices");
     }
 }
 
@@ -87,69 +62,27 @@ impl Watch for Log {
 #[test]
 fn progress_ends_at_its_total() {
     let log = Log(Mutex::new(Vec::new()));
-    eigenbasis(
-        &build(rough(30, 25)),
-        &EigenOptions {
-            count: 150,
-            ..Default::default()
-        },
-        &log,
-    )
-    .unwrap();
+    eigenbasis(&build(rough(30, 25)), &EigenOptions { count: 150, ..Default::default() }, &log).unwrap();
     let seen = log.0.into_inner().unwrap();
-    assert!(
-        seen.len() > 2
-            && seen
-                .iter()
-                .all(|&(done, total)| done <= total && total == 150)
-    );
+    assert!(seen.len() > 2 && seen.iter().all(|&(done, total)| done <= total && total == 150));
     assert_eq!(seen.last(), Some(&(150, 150)));
 }
 
 #[test]
 fn options_out_of_range_are_refused() {
     let built = build(rough(3, 3));
-    let none = EigenOptions {
-        count: 0,
-        ..Default::default()
-    };
-    assert!(matches!(
-        eigenbasis(&built, &none, &()),
-        Err(EigenError::Option {
-            option: "count",
-            ..
-        })
-    ));
+    let none = EigenOptions { count: 0, ..Default::default() };
+    assert!(matches!(eigenbasis(&built, &none, &()), Err(EigenError::Option { option: "count", .. })));
     for tolerance in [0.0, -1.0, f64::NAN, 1.0] {
-        let options = EigenOptions {
-            tolerance,
-            ..Default::default()
-        };
-        assert!(matches!(
-            eigenbasis(&built, &options, &()),
-            Err(EigenError::Option {
-                option: "tolerance",
-                ..
-            })
-        ));
+        let options = EigenOptions { tolerance, ..Default::default() };
+        assert!(matches!(eigenbasis(&built, &options, &()), Err(EigenError::Option { option: "tolerance", .. })));
     }
 }
 
 #[test]
 fn another_seed_gives_the_same_spectrum() {
     let built = build(rough(40, 25));
-    let solve = |seed| {
-        eigenbasis(
-            &built,
-            &EigenOptions {
-                count: 120,
-                seed,
-                ..Default::default()
-            },
-            &(),
-        )
-        .unwrap()
-    };
+    let solve = |seed| eigenbasis(&built, &EigenOptions { count: 120, seed, ..Default::default() }, &()).unwrap();
     let (a, b) = (solve(1), solve(2));
     assert!(zoo::distance(&a.eigenvalues, &b.eigenvalues) < 1e-11);
     assert!(zoo::subspace_distance(&a, &b, &built.vertex_mass, 1e-5) < 1e-9);

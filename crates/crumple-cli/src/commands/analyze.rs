@@ -61,7 +61,7 @@ impl Analyze {
         let mut descriptors = Vec::new();
         for mode in &modes.modes {
             let named = Named { run: mode.medoid.clone(), state: None };
-            let described = descriptor::describe(&loaded, &named, Some(&mode.name), &mode.name, &describe_options)?;
+            let described = descriptor::describe(&loaded, &named, Some(&mode.name), Some(&mode.name), &describe_options)?;
             descriptor::save(&loaded.study, &described.descriptor)?;
             descriptors.push(described.descriptor);
         }
@@ -94,21 +94,7 @@ impl Analyze {
 
     fn reference_run(&self, found: &[Found]) -> Result<Run, Error> {
         let Some(name) = &self.reference else {
-            // The first that can be read: a bundle whose first run failed is no reason to stop.
-            let usable = |found: &&Found| found.fault.is_none();
-            let mut first_error = None;
-            for run in found.iter().filter(usable) {
-                match Run::open(&run.id, &run.path) {
-                    Ok(run) => return Ok(run),
-                    Err(error) if self.add.skip_bad => first_error = first_error.or(Some(error)),
-                    Err(error) => return Err(error),
-                }
-            }
-            let why = found.first().and_then(|run| run.fault.clone()).unwrap_or_else(|| "no run".into());
-            return Err(first_error.unwrap_or(Error::BadRuns {
-                failures: vec![(found.first().map(|run| run.id.clone()).unwrap_or_default(), why)],
-                total: found.len(),
-            }));
+            return first_usable(found, self.add.skip_bad);
         };
         if let Some(run) = found.iter().find(|run| run.id == *name) {
             return Run::open(&run.id, &run.path);
@@ -138,6 +124,26 @@ impl Analyze {
             other => other,
         }
     }
+}
+
+/// The first run by name. With `skip_bad` the first that can be read: a bundle whose first run failed is no reason to
+/// stop.
+fn first_usable(found: &[Found], skip_bad: bool) -> Result<Run, Error> {
+    let mut first_error = None;
+    for run in found {
+        let opened = match &run.fault {
+            Some(fault) => Err(Error::Refused { what: fault.what.clone(), remedy: fault.remedy.clone() }),
+            None => Run::open(&run.id, &run.path),
+        };
+        match opened {
+            Ok(run) => return Ok(run),
+            Err(error) => first_error = first_error.or(Some(error)),
+        }
+        if !skip_bad {
+            break;
+        }
+    }
+    Err(first_error.unwrap_or(Error::Internal("a bundle without runs".into())))
 }
 
 fn descriptor_words(descriptors: &[Descriptor], unit: &str) -> String {

@@ -42,20 +42,14 @@ impl Describe {
             (_, Some(mode)) => Named { run: modes::load(&loaded.study)?.mode(mode)?.medoid.clone(), state: None },
             (run, None) => Named::parse(run.as_deref().unwrap_or_default()),
         };
-        let name = self.name.clone().or_else(|| self.mode.clone()).unwrap_or_else(|| file_name(&named));
-        let described = descriptor::describe(&loaded, &named, self.mode.as_deref(), &name, &options)?;
+        let name = self.name.as_deref().or(self.mode.as_deref());
+        let described = descriptor::describe(&loaded, &named, self.mode.as_deref(), name, &options)?;
         let path = descriptor::save(&loaded.study, &described.descriptor)?;
         let mut facts = facts(&described.descriptor);
         facts["path"] = json!(path);
         output.print(&facts, || words(&described.descriptor, &loaded.study.settings().length_unit));
         Ok(Answer::Done)
     }
-}
-
-/// The run's id as a file name.
-fn file_name(named: &Named) -> String {
-    let run = named.run.trim_matches(['/', '.']).replace(['/', '\\'], "_");
-    named.state.map_or(run.clone(), |state| format!("{run}@{state}"))
 }
 
 /// What `describe` tells a script.

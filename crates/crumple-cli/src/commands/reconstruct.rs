@@ -29,10 +29,10 @@ pub(crate) struct Reconstruct {
     #[arg(long, value_name = "DESCRIPTOR", group = "method")]
     descriptor: Option<String>,
     /// From the M eigenvectors of lowest frequency [default: all of them]
-    #[arg(long, value_name = "M", group = "method")]
+    #[arg(long, value_name = "M", allow_negative_numbers = true, group = "method")]
     first: Option<usize>,
     /// From M principal components of the displacements of all runs
-    #[arg(long, value_name = "M", group = "method")]
+    #[arg(long, value_name = "M", allow_negative_numbers = true, group = "method")]
     pca: Option<usize>,
     /// File to write: .vtu (with displacements), .obj or .stl
     #[arg(short, long, value_name = "FILE")]

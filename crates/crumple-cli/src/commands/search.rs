@@ -21,7 +21,7 @@ pub(crate) struct Search {
     /// Name of a descriptor of the study, or the path of its file
     descriptor: String,
     /// How many results, best first
-    #[arg(long, value_name = "N", default_value_t = 20)]
+    #[arg(long, value_name = "N", default_value_t = 20, allow_negative_numbers = true)]
     top: usize,
     /// Which states: the `last` one of each run, or `all` [default: last]
     #[arg(long, value_name = "WHICH")]

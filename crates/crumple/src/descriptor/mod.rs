@@ -130,7 +130,8 @@ pub const FIRST_M: &str = "first M";
 /// Name of the rival that uses principal components.
 pub const PCA: &str = "PCA";
 
-/// Builds the descriptor of one state, reconstructs the shape from it, and does the same with the rivals.
+/// Builds the descriptor of one state, reconstructs the shape from it, and does the same with the rivals. Without a
+/// name it is called after the run, with the state where one was asked for.
 ///
 /// # Errors
 /// [`Error::Threshold`], and errors of reading the state.
@@ -138,7 +139,7 @@ pub fn describe(
     loaded: &Loaded,
     named: &Named,
     mode: Option<&str>,
-    name: &str,
+    name: Option<&str>,
     options: &DescribeOptions,
 ) -> Result<Described, Error> {
     let &DescribeOptions { select, threshold } = options;
@@ -159,7 +160,7 @@ pub fn describe(
         pca_rival(loaded, &target, &original, m)?,
     ];
     let descriptor = Descriptor {
-        name: name.to_owned(),
+        name: name.map_or_else(|| default_name(&target, named), str::to_owned),
         kind: "paper".into(),
         basis: basis.id.clone(),
         run: target.run,
@@ -176,6 +177,11 @@ pub fn describe(
         eigenvectors,
     };
     Ok(Described { descriptor, original, values, reconstruction, first_m, first_k })
+}
+
+fn default_name(target: &Target, named: &Named) -> String {
+    let run = target.run.replace(['/', '\\'], "_");
+    named.state.map_or(run.clone(), |state| format!("{run}@{state}"))
 }
 
 /// Name of the rival that uses all eigenvectors of the study.

@@ -158,7 +158,7 @@ pub fn findings(
             return Err(Error::Stopped);
         }
         let named = Named { run: mode.medoid.clone(), state: None };
-        let described = describe(loaded, &named, Some(&mode.name), &mode.name, &options_of(loaded, mode, options))?;
+        let described = describe(loaded, &named, Some(&mode.name), Some(&mode.name), &options_of(loaded, mode, options))?;
         watch.step("describing modes", done.fetch_add(1, Ordering::Relaxed) + 1, modes.modes.len());
         Ok(described)
     };

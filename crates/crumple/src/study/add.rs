@@ -55,60 +55,75 @@ impl Study {
     /// The run's own error when there is one run, [`Error::BadRuns`] when there are several; [`Error::RunChanged`],
     /// [`Error::NoMatch`] for a table that fits no run, [`Error::Stopped`], [`Error::Io`].
     pub fn add(&mut self, found: &[Found], options: AddOptions<'_>, watch: &dyn Watch) -> Result<Added, Error> {
-        let writers = self.clear_litter()?;
+        self.clear_litter()?;
+        let writers = Lock::shared(&self.folder.join(coefficients::FOLDER).join(WRITERS))?;
+        let outcome = self.project_and_commit(found, options, watch);
+        drop(writers);
+        // Parts that the commit did not take up: a refused run, or one that was here already.
+        self.clear_litter()?;
+        outcome
+    }
+
+    fn project_and_commit(
+        &mut self,
+        found: &[Found],
+        options: AddOptions<'_>,
+        watch: &dyn Watch,
+    ) -> Result<Added, Error> {
         let mut result = Added::default();
         let inputs = self.inputs_of(found, options.params, &mut result.notes)?;
         let (unchanged, todo): (Vec<&Found>, Vec<&Found>) = found.iter().partition(|run| self.is_here(run));
         result.unchanged = unchanged.iter().map(|run| run.id.clone()).collect();
-        let work =
-            Work { reference: self.reference()?, basis: self.basis()?, total: todo.len(), done: Mutex::new(0), watch };
-        let mut records: BTreeMap<String, RunRecord> = BTreeMap::new();
-        let mut failures = Vec::new();
-        let mut stopped = false;
+        let projected = self.project_to_parts(&todo, options.skip_bad, watch)?;
+        result.skipped = projected.failures;
+        self.commit(projected.records, &inputs, options.replace, &mut result)?;
+        if projected.stopped { Err(Error::Stopped) } else { Ok(result) }
+    }
+
+    /// Projects runs batch by batch and writes a part for each; nothing refers to the parts yet.
+    fn project_to_parts(&self, todo: &[&Found], skip_bad: bool, watch: &dyn Watch) -> Result<Written, Error> {
+        let (reference, basis) = (self.reference()?, self.basis()?);
+        let work = Work { reference, basis, total: todo.len(), done: Mutex::new(0), watch };
+        let mut written = Written::default();
         for batch in todo.chunks(PART_RUNS) {
-            let mut finished: Vec<(Projected, &Found)> = Vec::new();
+            let (mut projected, mut runs) = (Vec::new(), Vec::new());
             for (run, outcome) in work.project_all(batch) {
                 match outcome {
-                    Ok(projected) => finished.push((projected, run)),
-                    Err(Error::Stopped) => stopped = true,
-                    Err(error) if todo.len() == 1 && !options.skip_bad => return Err(error),
-                    Err(error) => failures.push((run.id.clone(), error.to_string())),
+                    Ok(states) => {
+                        projected.push(states);
+                        runs.push(run);
+                    }
+                    Err(Error::Stopped) => written.stopped = true,
+                    Err(error) if todo.len() == 1 && !skip_bad => return Err(error),
+                    Err(error) => written.failures.push((run.id.clone(), error.to_string())),
                 }
             }
-            let projected: Vec<Projected> = finished.iter().map(|(projected, _)| projected.clone()).collect();
             if !projected.is_empty() {
                 let part = coefficients::write_part(&self.folder, &self.manifest.basis, &projected)?;
-                records.extend(
-                    finished.into_iter().map(|(projected, run)| (run.id.clone(), record(projected, run, &part))),
-                );
+                let records = projected.into_iter().zip(runs);
+                written.records.extend(records.map(|(states, run)| (run.id.clone(), record(states, run, &part))));
             }
-            if stopped {
+            if written.stopped {
                 break;
             }
         }
-        if !failures.is_empty() && !options.skip_bad {
-            return Err(Error::BadRuns { failures, total: todo.len() });
+        if !written.failures.is_empty() && !skip_bad {
+            return Err(Error::BadRuns { failures: written.failures, total: todo.len() });
         }
-        result.skipped = failures;
-        self.commit(records, &inputs, options.replace, &mut result)?;
-        drop(writers);
-        if stopped { Err(Error::Stopped) } else { Ok(result) }
+        Ok(written)
     }
 
-    /// Removes parts that no manifest names, if no writer can own them, and registers this process as a writer.
-    fn clear_litter(&mut self) -> Result<Lock, Error> {
+    /// Removes parts that no manifest names, if no writer is alive that could own them.
+    fn clear_litter(&mut self) -> Result<(), Error> {
         let path = self.folder.join(coefficients::FOLDER).join(WRITERS);
         if let Some(_alone) = Lock::try_exclusive(&path)? {
             self.refresh()?;
-            for part in coefficients::parts_on_disk(&self.folder)? {
-                let name =
-                    format!("{}/{}", coefficients::FOLDER, part.file_name().unwrap_or_default().to_string_lossy());
-                if !self.manifest.files.contains_key(&name) {
-                    std::fs::remove_file(&part).map_err(crate::error::io("remove", &part))?;
-                }
+            for part in coefficients::litter(&self.folder, &self.manifest)? {
+                let path = self.folder.join(part);
+                std::fs::remove_file(&path).map_err(crate::error::io("remove", &path))?;
             }
         }
-        Lock::shared(&path)
+        Ok(())
     }
 
     fn is_here(&self, run: &Found) -> bool {
@@ -202,6 +217,14 @@ struct Inputs {
     by_run: BTreeMap<String, BTreeMap<String, String>>,
 }
 
+/// Runs that are projected and on disk, but in no manifest.
+#[derive(Default)]
+struct Written {
+    records: BTreeMap<String, RunRecord>,
+    failures: Vec<(String, String)>,
+    stopped: bool,
+}
+
 /// What every projection of an add shares.
 struct Work<'a> {
     reference: Reference,
@@ -221,7 +244,7 @@ impl Work<'_> {
             return Err(Error::Stopped);
         }
         let projected = match &run.fault {
-            Some(fault) => Err(Error::NoStates { run: run.path.display().to_string(), reason: format!(": {fault}") }),
+            Some(fault) => Err(Error::Refused { what: fault.what.clone(), remedy: fault.remedy.clone() }),
             None => Run::open(&run.id, &run.path)
                 .and_then(|opened| project(&opened, &self.reference, &self.basis, self.watch)),
         };

@@ -49,7 +49,8 @@ pub fn check(folder: &Path) -> Result<Checkup, Error> {
     if problems.is_empty() {
         problems.extend(contradictions(folder, &manifest));
     }
-    notes.extend(litter(folder, &manifest));
+    let litter = coefficients::litter(folder, &manifest).unwrap_or_default();
+    notes.extend(litter.iter().map(|name| format!("{name}: no manifest names it; the next add clears it")));
     match tables::read_strings(&folder.join("runs.parquet"), "run") {
         Ok(runs) if runs.iter().eq(manifest.runs.keys()) => {}
         Ok(_) => notes.push("runs.parquet is behind the manifest; the next add renews it".into()),
@@ -86,16 +87,4 @@ fn contradictions(folder: &Path, manifest: &Manifest) -> Vec<String> {
         Ok(problems)
     };
     attempt().unwrap_or_else(|error| vec![error.to_string()])
-}
-
-fn litter(folder: &Path, manifest: &Manifest) -> Vec<String> {
-    let parts = coefficients::parts_on_disk(folder).unwrap_or_default();
-    let name =
-        |path: &Path| format!("{}/{}", coefficients::FOLDER, path.file_name().unwrap_or_default().to_string_lossy());
-    parts
-        .iter()
-        .map(|path| name(path))
-        .filter(|name| !manifest.files.contains_key(name))
-        .map(|name| format!("{name}: no manifest names it; the next add clears it"))
-        .collect()
 }

@@ -3,7 +3,7 @@
 //! `run`, `state`, `time`, six measures, then `d1_x`, `d1_y`, `d1_z`, `d2_x`, …: δ of eigenvector j (counted from 1)
 //! in f32. A part is never changed; its name is the hash of its content.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use arrow_array::cast::AsArray;
@@ -15,7 +15,7 @@ use parquet::arrow::{ArrowWriter, ProjectionMask};
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::file::reader::ChunkReader;
 
-use super::store;
+use super::{Manifest, store};
 use crate::Error;
 use crate::error::io;
 use crate::project::Projected;
@@ -183,14 +183,17 @@ pub(crate) fn read_part<R: ChunkReader + 'static>(
     Ok(())
 }
 
-/// Paths of the parts on disk, whether the manifest names them or not.
-pub(crate) fn parts_on_disk(folder: &Path) -> Result<Vec<PathBuf>, Error> {
+/// Files in the folder of the parts that no manifest names, by their path below the study.
+pub(crate) fn litter(folder: &Path, manifest: &Manifest) -> Result<Vec<String>, Error> {
     let parts = folder.join(FOLDER);
-    let entries = std::fs::read_dir(&parts).map_err(io("read the folder", &parts))?;
-    let mut paths: Vec<PathBuf> = entries
-        .map(|entry| entry.map(|entry| entry.path()).map_err(io("read the folder", &parts)))
-        .collect::<Result<_, _>>()?;
-    paths.retain(|path| path.is_file() && path.file_name().is_some_and(|name| name != super::WRITERS));
-    paths.sort();
-    Ok(paths)
+    let mut names = Vec::new();
+    for entry in std::fs::read_dir(&parts).map_err(io("read the folder", &parts))? {
+        let entry = entry.map_err(io("read the folder", &parts))?;
+        let name = format!("{FOLDER}/{}", entry.file_name().to_string_lossy());
+        if entry.file_name() != super::WRITERS && entry.path().is_file() && !manifest.files.contains_key(&name) {
+            names.push(name);
+        }
+    }
+    names.sort();
+    Ok(names)
 }

@@ -83,7 +83,7 @@ impl Manifest {
     pub fn read(folder: &Path) -> Result<Self, Error> {
         let path = folder.join(FILE);
         if !folder.exists() {
-            return Err(Error::NoSuchPath(folder.to_owned()));
+            return Err(Error::NotAStudy { folder: folder.to_owned(), what: "no such folder".into() });
         }
         let text = match std::fs::read_to_string(&path) {
             Err(error)

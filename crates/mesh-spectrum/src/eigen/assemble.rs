@@ -13,11 +13,7 @@ const CUT_GAP: f64 = 1e-6;
 /// Between two shifts the left slice numbers its pairs from the lower shift's count upwards, the right one from the
 /// upper shift's count downwards. Where both found a pair of the same number, its eigenvalues must agree: had either
 /// missed one, the numbers would be shifted.
-pub(crate) fn assemble(
-    slices: &[Slice],
-    top: f64,
-    tolerance: f64,
-) -> Result<(Vec<f64>, Vec<f64>), Trouble> {
+pub(crate) fn assemble(slices: &[Slice], top: f64, tolerance: f64) -> Result<(Vec<f64>, Vec<f64>), Trouble> {
     let mut borders = vec![slices.first().map_or(0, |slice| slice.first)];
     for pair in slices.windows(2) {
         borders.push(border(&pair[0], &pair[1], top, tolerance)?);
@@ -47,13 +43,9 @@ fn border(left: &Slice, right: &Slice, top: f64, tolerance: f64) -> Result<usize
         }
     }
     let gap = |number: usize| {
-        let before = number
-            .checked_sub(1)
-            .and_then(|number| left.eigenvalue(number).or(right.eigenvalue(number)));
+        let before = number.checked_sub(1).and_then(|number| left.eigenvalue(number).or(right.eigenvalue(number)));
         let after = right.eigenvalue(number).or(left.eigenvalue(number));
-        before
-            .zip(after)
-            .map_or(f64::INFINITY, |(before, after)| after - before)
+        before.zip(after).map_or(f64::INFINITY, |(before, after)| after - before)
     };
     match (right.first..=left.end()).max_by(|&a, &b| gap(a).total_cmp(&gap(b))) {
         Some(widest) if gap(widest) > CUT_GAP * top => Ok(widest),
@@ -72,23 +64,14 @@ impl Slice {
 
     /// The eigenvalue of a number in the component's spectrum, if this slice found it.
     fn eigenvalue(&self, number: usize) -> Option<f64> {
-        number
-            .checked_sub(self.first)
-            .and_then(|k| self.eigenvalues.get(k))
-            .copied()
+        number.checked_sub(self.first).and_then(|k| self.eigenvalues.get(k)).copied()
     }
 }
 
 /// Every shift must have as many eigenvalues below it as its inertia says. Result: shift, found, counted.
-pub(crate) fn check_counts(
-    eigenvalues: &[f64],
-    counts: &[(f64, usize)],
-) -> Result<Vec<(f64, usize, usize)>, Trouble> {
+pub(crate) fn check_counts(eigenvalues: &[f64], counts: &[(f64, usize)]) -> Result<Vec<(f64, usize, usize)>, Trouble> {
     let compare = |&(shift, counted): &(f64, usize)| {
-        let found = eigenvalues
-            .iter()
-            .filter(|&&eigenvalue| eigenvalue < shift)
-            .count();
+        let found = eigenvalues.iter().filter(|&&eigenvalue| eigenvalue < shift).count();
         if found != counted {
             return Err(Trouble::Again(format!(
                 "{found} eigenvalues found below {shift:e}, {counted} counted by inertia"

@@ -104,81 +104,50 @@ pub(crate) fn merge(
     // Vertices of each component with the row they have there.
     let mut row_of_dof = vec![0u32; operator.mass.len()];
     for component in components {
-        component
-            .dofs
-            .iter()
-            .enumerate()
-            .for_each(|(row, &dof)| row_of_dof[dof as usize] = row as u32);
+        component.dofs.iter().enumerate().for_each(|(row, &dof)| row_of_dof[dof as usize] = row as u32);
     }
     let mut places: Vec<Vec<(u32, u32)>> = vec![Vec::new(); components.len()];
     for (vertex, &dof) in operator.dof_of_vertex.iter().enumerate() {
-        places[operator.component_of_dof[dof as usize] as usize]
-            .push((vertex as u32, row_of_dof[dof as usize]));
+        places[operator.component_of_dof[dof as usize] as usize].push((vertex as u32, row_of_dof[dof as usize]));
     }
     let mut eigenvectors = vec![0.0; order.len() * vertices];
-    eigenvectors
-        .par_chunks_mut(vertices)
-        .zip(&order)
-        .for_each(|(phi, &(number, k))| {
-            let component = &components[number];
-            let v = &solved[number].vectors[k * component.rows()..][..component.rows()];
-            for &(vertex, row) in &places[number] {
-                phi[vertex as usize] = v[row as usize] / component.root_mass[row as usize];
-            }
-            fix_sign(phi);
-        });
+    eigenvectors.par_chunks_mut(vertices).zip(&order).for_each(|(phi, &(number, k))| {
+        let component = &components[number];
+        let v = &solved[number].vectors[k * component.rows()..][..component.rows()];
+        for &(vertex, row) in &places[number] {
+            phi[vertex as usize] = v[row as usize] / component.root_mass[row as usize];
+        }
+        fix_sign(phi);
+    });
 
-    let norm = components
-        .iter()
-        .map(|component| component.norm)
-        .fold(0.0, f64::max);
-    let scale = eigenvalues
-        .last()
-        .copied()
-        .filter(|&last| last > 0.0)
-        .unwrap_or(norm)
-        .max(f64::MIN_POSITIVE);
+    let norm = components.iter().map(|component| component.norm).fold(0.0, f64::max);
+    let scale = eigenvalues.last().copied().filter(|&last| last > 0.0).unwrap_or(norm).max(f64::MIN_POSITIVE);
     let cluster_gap = 100.0 * tolerance * scale;
     let counts: Vec<InertiaCount> = solved
         .iter()
         .enumerate()
         .flat_map(|(component, pairs)| {
-            pairs.counts.iter().map(
-                move |&(shift, below_expected, below_counted)| InertiaCount {
-                    component,
-                    shift,
-                    below_expected,
-                    below_counted,
-                },
-            )
+            pairs.counts.iter().map(move |&(shift, below_expected, below_counted)| InertiaCount {
+                component,
+                shift,
+                below_expected,
+                below_counted,
+            })
         })
         .collect();
     let clusters = ranges(&eigenvalues, |_| cluster_gap);
-    let sensitive = ranges(&eigenvalues, |eigenvalue| {
-        cluster_gap.max(1e-3 * eigenvalue)
-    });
+    let sensitive = ranges(&eigenvalues, |eigenvalue| cluster_gap.max(1e-3 * eigenvalue));
     let dense = solved.iter().filter(|pairs| pairs.dense).count();
     Eigenbasis {
         certificate: Certificate {
-            residual_max: evidence
-                .iter()
-                .map(|evidence| evidence.residual)
-                .fold(0.0, f64::max)
-                / scale,
+            residual_max: evidence.iter().map(|evidence| evidence.residual).fold(0.0, f64::max) / scale,
             residual_floor: 8.0 * 4e-16 * norm / scale,
-            orthogonality: evidence
-                .iter()
-                .map(|evidence| evidence.orthogonality)
-                .fold(0.0, f64::max),
-            complete: counts
-                .iter()
-                .all(|count| count.below_expected == count.below_counted),
+            orthogonality: evidence.iter().map(|evidence| evidence.orthogonality).fold(0.0, f64::max),
+            complete: counts.iter().all(|count| count.below_expected == count.below_counted),
             counts,
             components: components.len(),
             next_eigenvalue: next,
-            cluster_cut: next
-                .zip(eigenvalues.last())
-                .is_some_and(|(next, last)| next - last <= cluster_gap),
+            cluster_cut: next.zip(eigenvalues.last()).is_some_and(|(next, last)| next - last <= cluster_gap),
             method: if dense == solved.len() {
                 Method::Dense
             } else if dense == 0 {
@@ -233,10 +202,7 @@ mod tests {
 
     #[test]
     fn runs_of_close_values() {
-        assert_eq!(
-            ranges(&[0.0, 0.0, 1.0, 2.0, 2.05, 2.1, 3.0], |_| 0.06),
-            [0..2, 3..6]
-        );
+        assert_eq!(ranges(&[0.0, 0.0, 1.0, 2.0, 2.05, 2.1, 3.0], |_| 0.06), [0..2, 3..6]);
         assert_eq!(ranges(&[], |_| 1.0), Vec::<Range<usize>>::new());
     }
 }

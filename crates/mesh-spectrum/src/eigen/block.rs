@@ -150,12 +150,7 @@ fn update_panel<A: Arithmetic>(q: &[Row], c: &Small, w: &mut [Row]) {
 
 /// Y = a·A X + b·X + c·Y for a sparse symmetric A: the product itself, a residual, or a step of a Chebyshev recurrence.
 #[inline(always)]
-pub(crate) fn sparse_with<A: Arithmetic>(
-    matrix: &Csr,
-    x: &[Row],
-    y: &mut [Row],
-    [a, b, c]: [f64; 3],
-) {
+pub(crate) fn sparse_with<A: Arithmetic>(matrix: &Csr, x: &[Row], y: &mut [Row], [a, b, c]: [f64; 3]) {
     for (i, y) in y.iter_mut().enumerate().take(matrix.rows()) {
         let mut sum = [0.0; WIDTH];
         for (column, value) in matrix.row(i) {

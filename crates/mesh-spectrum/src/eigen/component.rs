@@ -16,8 +16,12 @@ use crate::operator::{Csr, Operator};
 /// Pairs on either side of a shift. Fewer: more factorisations; more: larger spaces.
 const PAIRS_A_SIDE: usize = 32;
 
-/// Above this size, `Symbolic` is worth its overhead; below, the dense solver wins whatever K is.
+/// Up to this size the dense solver takes no longer than a slice.
 pub(crate) const DENSE_BELOW: usize = 400;
+
+/// Where more than this share of all pairs is wanted, the dense solver finds all. The upper end of the spectrum is no
+/// place for slices: there is nothing on one side, and Weyl's law does not hold.
+pub(crate) const DENSE_SHARE: f64 = 0.9;
 
 /// Pairs that neighbouring slices both find, a side, so that they check each other and the border can be put into the
 /// widest gap. Doubled at each new attempt.
@@ -58,51 +62,26 @@ pub(crate) struct Pairs {
 
 impl Component {
     /// Takes the component's rows out of the operator. `dofs` ascending.
-    pub(crate) fn new(
-        operator: &Operator,
-        dofs: Vec<u32>,
-        place_of_dof: &[u32],
-    ) -> Result<Component, EigenError> {
-        let root_mass: Vec<f64> = dofs
-            .iter()
-            .map(|&dof| operator.mass[dof as usize].sqrt())
-            .collect();
-        let mut matrix = Csr {
-            start: vec![0],
-            columns: Vec::new(),
-            values: Vec::new(),
-        };
+    pub(crate) fn new(operator: &Operator, dofs: Vec<u32>, place_of_dof: &[u32]) -> Result<Component, EigenError> {
+        let root_mass: Vec<f64> = dofs.iter().map(|&dof| operator.mass[dof as usize].sqrt()).collect();
+        let mut matrix = Csr { start: vec![0], columns: Vec::new(), values: Vec::new() };
         for (i, &dof) in dofs.iter().enumerate() {
             for (column, value) in operator.stiffness.row(dof as usize) {
                 let j = place_of_dof[column];
                 matrix.columns.push(j);
-                matrix
-                    .values
-                    .push(value / (root_mass[i] * root_mass[j as usize]));
+                matrix.values.push(value / (root_mass[i] * root_mass[j as usize]));
             }
             matrix.start.push(matrix.columns.len());
         }
         let norm = norm(&matrix);
         if !(norm.is_normal() && (1.0 / norm).is_normal()) {
-            let row = (0..dofs.len())
-                .find(|&row| !matrix.row(row).all(|(_, value)| value.is_finite()))
-                .unwrap_or(0);
-            return Err(EigenError::NotFinite {
-                dof: dofs[row] as usize,
-            });
+            let row = (0..dofs.len()).find(|&row| !matrix.row(row).all(|(_, value)| value.is_finite())).unwrap_or(0);
+            return Err(EigenError::NotFinite { dof: dofs[row] as usize });
         }
         let unit = norm.log2().round().clamp(-1000.0, 1000.0).exp2();
         matrix.values.iter_mut().for_each(|value| *value /= unit);
         let area = dofs.iter().map(|&dof| operator.mass[dof as usize]).sum();
-        Ok(Component {
-            norm,
-            unit,
-            matrix,
-            dofs,
-            root_mass,
-            area,
-            symbolic: None,
-        })
+        Ok(Component { norm, unit, matrix, dofs, root_mass, area, symbolic: None })
     }
 
     /// Puts the rows in elimination order and prepares the factorisation.
@@ -110,10 +89,7 @@ impl Component {
         let order = elimination_order(&self.matrix)?;
         self.matrix = permuted(&self.matrix, &order);
         self.dofs = order.iter().map(|&row| self.dofs[row as usize]).collect();
-        self.root_mass = order
-            .iter()
-            .map(|&row| self.root_mass[row as usize])
-            .collect();
+        self.root_mass = order.iter().map(|&row| self.root_mass[row as usize]).collect();
         self.symbolic = Some(Symbolic::new(&self.matrix)?);
         Ok(())
     }
@@ -126,9 +102,7 @@ impl Component {
     /// must be prepared.
     pub(crate) fn count_below(&self, shift: f64) -> Option<usize> {
         let shift = shift / self.unit;
-        self.factor(shift)
-            .filter(|factor| factor.pivot_min > 1e-9 * shift)
-            .map(|factor| factor.below)
+        self.factor(shift).filter(|factor| factor.pivot_min > 1e-9 * shift).map(|factor| factor.below)
     }
 
     /// Factors A − σI, both in `unit`.
@@ -144,10 +118,7 @@ impl Component {
                 continue;
             };
             let good = factor.growth < GROWTH_MAX && factor.pivot_min > PIVOT_MIN * spacing;
-            if best
-                .as_ref()
-                .is_none_or(|best| factor.growth / factor.pivot_min < best.growth / best.pivot_min)
-            {
+            if best.as_ref().is_none_or(|best| factor.growth / factor.pivot_min < best.growth / best.pivot_min) {
                 best = Some(factor);
             }
             if good {
@@ -170,24 +141,15 @@ impl Component {
         for i in 0..n {
             self.matrix.row(i).for_each(|(j, value)| a[(i, j)] = value);
         }
-        let pairs = a
-            .self_adjoint_eigen(Side::Lower)
-            .map_err(|_| EigenError::NotConverged {
-                found: 0,
-                wanted: n,
-                detail: "the dense solver did not converge".into(),
-            })?;
+        let pairs = a.self_adjoint_eigen(Side::Lower).map_err(|_| EigenError::NotConverged {
+            found: 0,
+            wanted: n,
+            detail: "the dense solver did not converge".into(),
+        })?;
         let vectors = pairs.U();
         Ok(Pairs {
-            eigenvalues: pairs
-                .S()
-                .column_vector()
-                .iter()
-                .map(|e| e * self.unit)
-                .collect(),
-            vectors: (0..n)
-                .flat_map(|k| (0..n).map(move |i| vectors[(i, k)]))
-                .collect(),
+            eigenvalues: pairs.S().column_vector().iter().map(|e| e * self.unit).collect(),
+            vectors: (0..n).flat_map(|k| (0..n).map(move |i| vectors[(i, k)])).collect(),
             counts: Vec::new(),
             dense: true,
         })
@@ -205,40 +167,21 @@ impl Component {
         if count == 1 {
             let counts = vec![(top, 1, 1)];
             progress.add(1);
-            return Ok(Pairs {
-                eigenvalues: vec![0.0],
-                vectors: self.null_vector(),
-                counts,
-                dense: false,
-            });
+            return Ok(Pairs { eigenvalues: vec![0.0], vectors: self.null_vector(), counts, dense: false });
         }
         let mut detail = String::new();
         for attempt in 0..4 {
-            match self.attempt(
-                top / self.unit,
-                count,
-                tolerance,
-                mix(seed, attempt),
-                attempt as usize,
-                progress,
-            ) {
+            match self.attempt(top / self.unit, count, tolerance, mix(seed, attempt), attempt as usize, progress) {
                 Ok(mut pairs) => {
                     pairs.eigenvalues.iter_mut().for_each(|e| *e *= self.unit);
-                    pairs
-                        .counts
-                        .iter_mut()
-                        .for_each(|(shift, ..)| *shift *= self.unit);
+                    pairs.counts.iter_mut().for_each(|(shift, ..)| *shift *= self.unit);
                     return Ok(pairs);
                 }
                 Err(Trouble::Fatal(error)) => return Err(error),
                 Err(Trouble::Again(seen)) => detail = seen,
             }
         }
-        Err(EigenError::NotConverged {
-            found: 0,
-            wanted: count,
-            detail,
-        })
+        Err(EigenError::NotConverged { found: 0, wanted: count, detail })
     }
 
     /// One attempt, everything in `unit`.
@@ -252,10 +195,7 @@ impl Component {
         progress: &Progress,
     ) -> Result<Pairs, Trouble> {
         let factors = self.shifts(top, count, attempt, progress)?;
-        let mut counts: Vec<(f64, usize)> = factors
-            .iter()
-            .map(|factor| (factor.shift, factor.below))
-            .collect();
+        let mut counts: Vec<(f64, usize)> = factors.iter().map(|factor| (factor.shift, factor.below)).collect();
         let last = factors.len() - 1;
         let overlap = OVERLAP << attempt;
         let half = |between: usize| (between.div_ceil(2) + overlap).min(between);
@@ -263,51 +203,20 @@ impl Component {
             .into_par_iter()
             .enumerate()
             .map(|(i, factor)| {
-                let left = if i == 0 {
-                    counts[0].1
-                } else {
-                    half(counts[i].1 - counts[i - 1].1)
-                };
-                let right = if i == last {
-                    count - counts[last].1
-                } else {
-                    half(counts[i + 1].1 - counts[i].1)
-                };
+                let left = if i == 0 { counts[0].1 } else { half(counts[i].1 - counts[i - 1].1) };
+                let right = if i == last { count - counts[last].1 } else { half(counts[i + 1].1 - counts[i].1) };
                 let seed = mix(seed, 100 + i as u64);
-                slice(
-                    &self.matrix,
-                    &factor,
-                    Demand {
-                        left,
-                        right,
-                        top,
-                        tolerance,
-                        seed,
-                        partial: attempt == 0,
-                    },
-                    progress,
-                )
+                slice(&self.matrix, &factor, Demand { left, right, top, tolerance, seed }, progress)
             })
             .collect::<Result<_, Trouble>>()?;
         counts.push((top, count));
         let (eigenvalues, vectors) = assemble(&slices, top, tolerance)?;
         let counts = check_counts(&eigenvalues, &counts)?;
-        Ok(Pairs {
-            eigenvalues,
-            vectors,
-            counts,
-            dense: false,
-        })
+        Ok(Pairs { eigenvalues, vectors, counts, dense: false })
     }
 
     /// Chooses shifts so that every slice has about `PAIRS_A_SIDE` pairs on each side, and factors at them. Ascending.
-    fn shifts(
-        &self,
-        top: f64,
-        count: usize,
-        attempt: usize,
-        progress: &Progress,
-    ) -> Result<Vec<Factor>, Trouble> {
+    fn shifts(&self, top: f64, count: usize, attempt: usize, progress: &Progress) -> Result<Vec<Factor>, Trouble> {
         let slices = (count as f64 / (2 * PAIRS_A_SIDE) as f64).round().max(1.0);
         let weyl = Weyl::through(self.area * self.unit, top, count as f64);
         let spacing = top / count as f64;
@@ -319,29 +228,19 @@ impl Component {
             self.factor_near(shift, spacing)
                 .ok_or_else(|| Trouble::Again(format!("no factorisation near the shift {shift:e}")))
         };
-        let wanted: Vec<f64> = (0..slices as usize)
-            .map(|i| weyl.inverse((i as f64 + 0.5) * count as f64 / slices))
-            .collect();
-        let mut factors = wanted
-            .into_par_iter()
-            .map(place)
-            .collect::<Result<Vec<_>, _>>()?;
+        let wanted: Vec<f64> =
+            (0..slices as usize).map(|i| weyl.inverse((i as f64 + 0.5) * count as f64 / slices)).collect();
+        let mut factors = wanted.into_par_iter().map(place).collect::<Result<Vec<_>, _>>()?;
         for _ in 0..6 {
             factors.sort_by(|a, b| a.shift.total_cmp(&b.shift));
             // Where Weyl's law was too far off, halve the interval.
             let mut more = Vec::new();
             let ends = |i: usize| {
-                if i == 0 {
-                    (0.0, 0)
-                } else {
-                    (factors[i - 1].shift, factors[i - 1].below)
-                }
+                if i == 0 { (0.0, 0) } else { (factors[i - 1].shift, factors[i - 1].below) }
             };
             for i in 0..=factors.len() {
                 let (low, below) = ends(i);
-                let (high, above) = factors
-                    .get(i)
-                    .map_or((top, count), |factor| (factor.shift, factor.below));
+                let (high, above) = factors.get(i).map_or((top, count), |factor| (factor.shift, factor.below));
                 let sides = if i == 0 || i == factors.len() { 1 } else { 2 };
                 if above - below > PAIRS_A_SIDE * sides * 17 / 10 && high - low > 1e-5 * top {
                     more.push(0.5 * (low + high));
@@ -350,11 +249,7 @@ impl Component {
             if more.is_empty() {
                 break;
             }
-            factors.extend(
-                more.into_par_iter()
-                    .map(place)
-                    .collect::<Result<Vec<_>, _>>()?,
-            );
+            factors.extend(more.into_par_iter().map(place).collect::<Result<Vec<_>, _>>()?);
         }
         factors.sort_by(|a, b| a.shift.total_cmp(&b.shift));
         factors.retain(|factor| factor.shift < top && factor.below <= count);

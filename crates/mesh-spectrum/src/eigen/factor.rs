@@ -44,20 +44,9 @@ impl Symbolic {
     pub(crate) fn new(matrix: &Csr) -> Result<Symbolic, EigenError> {
         let n = matrix.rows();
         let start = matrix.start.clone();
-        let columns: Vec<usize> = matrix
-            .columns
-            .iter()
-            .map(|&column| column as usize)
-            .collect();
-        let diagonal = (0..n)
-            .map(|row| {
-                start[row]
-                    + matrix
-                        .row(row)
-                        .take_while(|&(column, _)| column < row)
-                        .count()
-            })
-            .collect();
+        let columns: Vec<usize> = matrix.columns.iter().map(|&column| column as usize).collect();
+        let diagonal =
+            (0..n).map(|row| start[row] + matrix.row(row).take_while(|&(column, _)| column < row).count()).collect();
         let pattern = SymbolicSparseColMatRef::new_checked(n, n, &start, None, &columns);
         let parameters = cholesky::CholeskySymbolicParams {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
@@ -70,13 +59,7 @@ impl Symbolic {
             parameters,
         )
         .map_err(|_| EigenError::OutOfMemory { dofs: n })?;
-        Ok(Symbolic {
-            values: matrix.values.clone(),
-            start,
-            columns,
-            diagonal,
-            cholesky,
-        })
+        Ok(Symbolic { values: matrix.values.clone(), start, columns, diagonal, cholesky })
     }
 
     fn supernodes(&self) -> &supernodal::SymbolicSupernodalCholesky<usize> {
@@ -133,15 +116,7 @@ fn pack(symbolic: &supernodal::SymbolicSupernodalCholesky<usize>, l: &[f64], shi
         let diagonal = values_len;
         let below = diagonal + WIDTH * (blocks * (blocks + 1) / 2);
         values_len = below + groups * stride;
-        supernodes.push(Supernode {
-            begin,
-            width,
-            stride,
-            diagonal,
-            below,
-            rows: rows.len(),
-            groups,
-        });
+        supernodes.push(Supernode { begin, width, stride, diagonal, below, rows: rows.len(), groups });
         rows.extend(pattern.iter().map(|&row| row as u32));
         rows.resize(supernodes[number].rows + WIDTH * groups, n as u32);
     }
@@ -154,19 +129,14 @@ fn pack(symbolic: &supernodal::SymbolicSupernodalCholesky<usize>, l: &[f64], shi
         for (j, column) in columns.chunks_exact(height).enumerate() {
             let pivot = column[j];
             below += usize::from(pivot < 0.0);
-            pivot_min = if pivot.is_nan() {
-                f64::NAN
-            } else {
-                pivot_min.min(pivot.abs())
-            };
+            pivot_min = if pivot.is_nan() { f64::NAN } else { pivot_min.min(pivot.abs()) };
             inverse[s.begin + j] = 1.0 / pivot;
-            growth = column[j + 1..].iter().fold(growth, |most, x| {
-                if x.is_nan() {
-                    f64::INFINITY
-                } else {
-                    most.max(x.abs())
-                }
-            });
+            growth = column[j + 1..].iter().fold(
+                growth,
+                |most, x| {
+                    if x.is_nan() { f64::INFINITY } else { most.max(x.abs()) }
+                },
+            );
             for (i, &entry) in column.iter().enumerate().take(s.width).skip(j + 1) {
                 let group = i / WIDTH;
                 values[s.diagonal + WIDTH * (group * (group + 1) / 2) + j][i % WIDTH] = entry;
@@ -176,48 +146,23 @@ fn pack(symbolic: &supernodal::SymbolicSupernodalCholesky<usize>, l: &[f64], shi
             }
         }
     }
-    Factor {
-        shift,
-        below,
-        growth,
-        pivot_min,
-        packed: Packed {
-            supernodes,
-            values,
-            rows,
-            inverse,
-        },
-    }
+    Factor { shift, below, growth, pivot_min, packed: Packed { supernodes, values, rows, inverse } }
 }
 
 /// An elimination order with little fill: approximate minimum degree, then a postorder of the elimination tree, so that
 /// columns of one supernode are neighbours. Result: position → row.
 pub(crate) fn elimination_order(matrix: &Csr) -> Result<Vec<u32>, EigenError> {
     let n = matrix.rows();
-    let columns: Vec<usize> = matrix
-        .columns
-        .iter()
-        .map(|&column| column as usize)
-        .collect();
+    let columns: Vec<usize> = matrix.columns.iter().map(|&column| column as usize).collect();
     let pattern = SymbolicSparseColMatRef::new_checked(n, n, &matrix.start, None, &columns);
     let (mut order, mut inverse) = (vec![0; n], vec![0; n]);
     let out_of_memory = || EigenError::OutOfMemory { dofs: n };
-    let mut scratch = MemBuffer::try_new(amd::order_scratch::<usize>(n, columns.len()))
+    let mut scratch = MemBuffer::try_new(amd::order_scratch::<usize>(n, columns.len())).map_err(|_| out_of_memory())?;
+    amd::order(&mut order, &mut inverse, pattern, amd::Control::default(), MemStack::new(&mut scratch))
         .map_err(|_| out_of_memory())?;
-    amd::order(
-        &mut order,
-        &mut inverse,
-        pattern,
-        amd::Control::default(),
-        MemStack::new(&mut scratch),
-    )
-    .map_err(|_| out_of_memory())?;
     let order: Vec<u32> = order.iter().map(|&row| row as u32).collect();
     let parents = elimination_tree(&permuted(matrix, &order));
-    Ok(postorder(&parents)
-        .iter()
-        .map(|&position| order[position as usize])
-        .collect())
+    Ok(postorder(&parents).iter().map(|&position| order[position as usize]).collect())
 }
 
 /// B[i, j] = A[order[i], order[j]].
@@ -232,10 +177,8 @@ pub(crate) fn permuted(matrix: &Csr, order: &[u32]) -> Csr {
         values: Vec::with_capacity(matrix.values.len()),
     };
     for &old in order {
-        let mut row: Vec<(u32, f64)> = matrix
-            .row(old as usize)
-            .map(|(column, value)| (position[column], value))
-            .collect();
+        let mut row: Vec<(u32, f64)> =
+            matrix.row(old as usize).map(|(column, value)| (position[column], value)).collect();
         row.sort_unstable_by_key(|entry| entry.0);
         result.columns.extend(row.iter().map(|entry| entry.0));
         result.values.extend(row.iter().map(|entry| entry.1));
@@ -320,42 +263,26 @@ mod tests {
             let order = elimination_order(&matrix).unwrap();
             let matrix = permuted(&matrix, &order);
             let n = matrix.rows();
-            let dense = faer::Mat::from_fn(n, n, |i, j| {
-                matrix.row(i).find(|e| e.0 == j).map_or(0.0, |e| e.1)
-            });
+            let dense = faer::Mat::from_fn(n, n, |i, j| matrix.row(i).find(|e| e.0 == j).map_or(0.0, |e| e.1));
             let eigenvalues = dense.self_adjoint_eigenvalues(Side::Lower).unwrap();
             let symbolic = Symbolic::new(&matrix).unwrap();
             for k in [0, n / 3, n - 1] {
-                let shift = if k == 0 {
-                    eigenvalues[0] - 0.1
-                } else {
-                    0.5 * (eigenvalues[k - 1] + eigenvalues[k])
-                };
+                let shift = if k == 0 { eigenvalues[0] - 0.1 } else { 0.5 * (eigenvalues[k - 1] + eigenvalues[k]) };
                 let factor = symbolic.factor(shift).unwrap();
                 assert_eq!(factor.below, k);
                 let x: Vec<Row> = (0..=n)
                     .map(|i| {
-                        Row(std::array::from_fn(|c| {
-                            if i < n {
-                                ((i * 31 + c * 7) % 17) as f64 - 8.0
-                            } else {
-                                0.0
-                            }
-                        }))
+                        Row(std::array::from_fn(|c| if i < n { ((i * 31 + c * 7) % 17) as f64 - 8.0 } else { 0.0 }))
                     })
                     .collect();
                 let mut b = vec![ZERO; n + 1];
                 dispatch::sparse(&matrix, &x, &mut b, [1.0, -shift, 0.0]);
                 dispatch::solve(&factor.packed, &mut b);
-                let distance = eigenvalues
-                    .iter()
-                    .map(|l| (l - shift).abs())
-                    .fold(f64::INFINITY, f64::min);
+                let distance = eigenvalues.iter().map(|l| (l - shift).abs()).fold(f64::INFINITY, f64::min);
                 for i in 0..n {
                     for c in 0..WIDTH {
                         // Rounding of 1e-16, times growth, times the condition ‖A‖/distance.
-                        let tolerance =
-                            1e-14 * factor.growth.max(1.0) * eigenvalues[n - 1] / distance;
+                        let tolerance = 1e-14 * factor.growth.max(1.0) * eigenvalues[n - 1] / distance;
                         assert!(
                             (b[i][c] - x[i][c]).abs() < tolerance,
                             "side {side}, row {i}: {} is not {}",

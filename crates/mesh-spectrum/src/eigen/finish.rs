@@ -30,18 +30,13 @@ pub(crate) fn finish(component: &Component, pairs: &mut Pairs) -> Result<Evidenc
     let n = component.rows();
     let count = pairs.eigenvalues.len();
     if count == 0 {
-        return Ok(Evidence {
-            residual: 0.0,
-            orthogonality: 0.0,
-        });
+        return Ok(Evidence { residual: 0.0, orthogonality: 0.0 });
     }
     let null = component.null_vector();
     pairs.vectors[..n].copy_from_slice(&null);
     pairs.vectors.par_chunks_mut(n).skip(1).for_each(|v| {
         let along: f64 = v.iter().zip(&null).map(|(v, null)| v * null).sum();
-        v.iter_mut()
-            .zip(&null)
-            .for_each(|(v, null)| *v -= along * null);
+        v.iter_mut().zip(&null).for_each(|(v, null)| *v -= along * null);
         let scale = 1.0 / v.iter().map(|v| v * v).sum::<f64>().sqrt();
         v.iter_mut().for_each(|v| *v *= scale);
     });
@@ -49,9 +44,7 @@ pub(crate) fn finish(component: &Component, pairs: &mut Pairs) -> Result<Evidenc
     let mut gram = gram(&pairs.vectors, n, count);
     let orthogonality = loss(&gram);
     if orthogonality.is_nan() || orthogonality > OVERLAP_MAX {
-        return Err(EigenError::NotOrthogonal {
-            loss: orthogonality,
-        });
+        return Err(EigenError::NotOrthogonal { loss: orthogonality });
     }
     if orthogonality > 10.0 * CLEAN_ABOVE {
         clean(&mut pairs.vectors, n, &gram);
@@ -63,20 +56,13 @@ pub(crate) fn finish(component: &Component, pairs: &mut Pairs) -> Result<Evidenc
         .zip(&pairs.eigenvalues)
         .map(|(v, eigenvalue)| {
             let square = |row| {
-                let product: f64 = component
-                    .matrix
-                    .row(row)
-                    .map(|(column, value)| value * v[column])
-                    .sum();
+                let product: f64 = component.matrix.row(row).map(|(column, value)| value * v[column]).sum();
                 (product - eigenvalue / component.unit * v[row]).powi(2)
             };
             (0..n).map(square).sum::<f64>().sqrt() * component.unit
         })
         .reduce(|| 0.0, f64::max); // a maximum, the same in any order
-    Ok(Evidence {
-        residual,
-        orthogonality: loss(&gram),
-    })
+    Ok(Evidence { residual, orthogonality: loss(&gram) })
 }
 
 /// The lower half of Vᵀ V.
@@ -84,17 +70,7 @@ fn gram(vectors: &[f64], n: usize, count: usize) -> Mat<f64> {
     let v = MatRef::from_column_major_slice(vectors, n, count);
     let mut gram = Mat::zeros(count, count);
     let (lower, full) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
-    matmul(
-        gram.as_mut(),
-        lower,
-        Accum::Replace,
-        v.transpose(),
-        full,
-        v,
-        full,
-        1.0,
-        Par::Seq,
-    );
+    matmul(gram.as_mut(), lower, Accum::Replace, v.transpose(), full, v, full, 1.0, Par::Seq);
     gram
 }
 
@@ -104,11 +80,7 @@ fn loss(gram: &Mat<f64>) -> f64 {
     for j in 0..gram.ncols() {
         for i in j..gram.nrows() {
             let off = (gram[(i, j)] - if i == j { 1.0 } else { 0.0 }).abs();
-            most = if off > most || off.is_nan() {
-                off
-            } else {
-                most
-            };
+            most = if off > most || off.is_nan() { off } else { most };
         }
     }
     most
@@ -125,11 +97,7 @@ fn clean(vectors: &mut [f64], n: usize, gram: &Mat<f64>) {
             }
             let (head, tail) = vectors.split_at_mut(i * n);
             let (low, high) = (&mut head[j * n..][..n], &mut tail[..n]);
-            let (to_low, to_high) = if j == 0 {
-                (0.0, along)
-            } else {
-                (0.5 * along, 0.5 * along)
-            };
+            let (to_low, to_high) = if j == 0 { (0.0, along) } else { (0.5 * along, 0.5 * along) };
             for (low, high) in low.iter_mut().zip(high) {
                 (*low, *high) = (*low - to_low * *high, *high - to_high * *low);
             }

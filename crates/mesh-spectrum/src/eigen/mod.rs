@@ -12,7 +12,6 @@ mod component;
 mod factor;
 mod finish;
 mod lanczos;
-mod omega;
 mod slice;
 pub(crate) mod solve;
 mod spectrum;
@@ -25,7 +24,7 @@ use thiserror::Error;
 
 use crate::operator::Operator;
 pub use basis::{Certificate, Eigenbasis, InertiaCount, Method};
-use component::{Component, DENSE_BELOW, Pairs};
+use component::{Component, DENSE_BELOW, DENSE_SHARE, Pairs};
 use finish::finish;
 use spectrum::{keep_lowest, lowest};
 
@@ -40,19 +39,13 @@ pub struct EigenOptions {
     pub tolerance: f64,
     /// Seed of the random start vectors. Default 1. Another seed gives the same spectrum with other rounding.
     pub seed: u64,
-    /// Components of at most this many degrees of freedom, and those of which more than half of all pairs are wanted,
-    /// go through the dense solver. Default 400, where the two cost the same. The dense solver takes O(n³) time.
+    /// Components of at most this many degrees of freedom, and those of which nearly all pairs are wanted, go through the dense solver. Default 400, where the two cost the same. The dense solver takes O(n³) time.
     pub dense_below: usize,
 }
 
 impl Default for EigenOptions {
     fn default() -> EigenOptions {
-        EigenOptions {
-            count: 500,
-            tolerance: 1e-10,
-            seed: 1,
-            dense_below: DENSE_BELOW,
-        }
+        EigenOptions { count: 500, tolerance: 1e-10, seed: 1, dense_below: DENSE_BELOW }
     }
 }
 
@@ -144,8 +137,7 @@ impl Progress<'_> {
 
     pub(crate) fn add(&self, pairs: usize) {
         let done = self.done.fetch_add(pairs, Ordering::Relaxed) + pairs;
-        self.watch
-            .step("eigenpairs", done.min(self.total), self.total);
+        self.watch.step("eigenpairs", done.min(self.total), self.total);
     }
 }
 
@@ -163,37 +155,16 @@ impl Progress<'_> {
 /// Pairs that cannot be found, or not to the tolerance, are an error that says so with numbers; never a shorter or
 /// poorer basis. [`EigenError::Stopped`] within about a second of [`Watch::stopped`] (a factorisation of a large mesh
 /// is not interrupted).
-pub fn eigenbasis(
-    operator: &Operator,
-    options: &EigenOptions,
-    watch: &dyn Watch,
-) -> Result<Eigenbasis, EigenError> {
-    let &EigenOptions {
-        count,
-        tolerance,
-        seed,
-        dense_below,
-    } = options;
+pub fn eigenbasis(operator: &Operator, options: &EigenOptions, watch: &dyn Watch) -> Result<Eigenbasis, EigenError> {
+    let &EigenOptions { count, tolerance, seed, dense_below } = options;
     if count == 0 {
-        return Err(EigenError::Option {
-            option: "count",
-            value: 0.0,
-            expected: "at least one eigenpair",
-        });
+        return Err(EigenError::Option { option: "count", value: 0.0, expected: "at least one eigenpair" });
     }
     if !(tolerance > 0.0 && tolerance < 1e-2) {
-        return Err(EigenError::Option {
-            option: "tolerance",
-            value: tolerance,
-            expected: "between 0 and 0.01",
-        });
+        return Err(EigenError::Option { option: "tolerance", value: tolerance, expected: "between 0 and 0.01" });
     }
     let count = count.min(operator.mass.len());
-    let progress = Progress {
-        watch,
-        done: AtomicUsize::new(0),
-        total: count,
-    };
+    let progress = Progress { watch, done: AtomicUsize::new(0), total: count };
 
     let mut components = split(operator)?;
     let area: f64 = operator.mass.iter().sum();
@@ -202,8 +173,7 @@ pub fn eigenbasis(
     let dense: Vec<bool> = components
         .iter()
         .map(|component| {
-            component.rows() <= dense_below.max(16)
-                || 2.0 * expected(component) > component.rows() as f64
+            component.rows() <= dense_below.max(16) || expected(component) > DENSE_SHARE * component.rows() as f64
         })
         .collect();
     components
@@ -223,18 +193,9 @@ pub fn eigenbasis(
         return Err(EigenError::Stopped);
     }
     let basis = basis::merge(operator, &components, &solved, &evidence, next, tolerance);
-    let Certificate {
-        residual_max: residual,
-        residual_floor: floor,
-        orthogonality: loss,
-        ..
-    } = basis.certificate;
+    let Certificate { residual_max: residual, residual_floor: floor, orthogonality: loss, .. } = basis.certificate;
     if residual.is_nan() || residual > tolerance.max(floor) {
-        return Err(EigenError::Residual {
-            residual,
-            tolerance,
-            floor,
-        });
+        return Err(EigenError::Residual { residual, tolerance, floor });
     }
     if loss.is_nan() || loss > 1e-10 {
         return Err(EigenError::NotOrthogonal { loss });
@@ -251,7 +212,5 @@ fn split(operator: &Operator) -> Result<Vec<Component>, EigenError> {
         place_of_dof[dof] = dofs[component as usize].len() as u32;
         dofs[component as usize].push(dof as u32);
     }
-    dofs.into_par_iter()
-        .map(|dofs| Component::new(operator, dofs, &place_of_dof))
-        .collect()
+    dofs.into_par_iter().map(|dofs| Component::new(operator, dofs, &place_of_dof)).collect()
 }

@@ -22,8 +22,6 @@ pub(crate) struct Demand {
     pub(crate) tolerance: f64,
     /// For the random start.
     pub(crate) seed: u64,
-    /// Orthogonalise only where needed; the second attempt does it always.
-    pub(crate) partial: bool,
 }
 
 /// The pairs of a slice, ascending.
@@ -51,25 +49,14 @@ impl From<EigenError> for Trouble {
 }
 
 /// Finds `demand.left` + `demand.right` pairs around the factor's shift.
-pub(crate) fn slice(
-    matrix: &Csr,
-    factor: &Factor,
-    demand: Demand,
-    progress: &Progress,
-) -> Result<Slice, Trouble> {
-    let Demand {
-        left, right, seed, partial, ..
-    } = demand;
-    let mut found = Slice {
-        first: factor.below - left,
-        eigenvalues: Vec::new(),
-        vectors: Vec::new(),
-    };
+pub(crate) fn slice(matrix: &Csr, factor: &Factor, demand: Demand, progress: &Progress) -> Result<Slice, Trouble> {
+    let Demand { left, right, seed, .. } = demand;
+    let mut found = Slice { first: factor.below - left, eigenvalues: Vec::new(), vectors: Vec::new() };
     if left + right == 0 {
         return Ok(found);
     }
     let n = matrix.rows();
-    let mut lanczos = Lanczos::new(factor, n, seed, partial);
+    let mut lanczos = Lanczos::new(factor, n, seed);
     // Measured on sheet meshes. A space a little too large costs a step, one too small another projected problem.
     let mut next = 90 + 5 * (left + right) / 2 + left.max(right);
     let (ritz, chosen) = loop {
@@ -80,9 +67,7 @@ pub(crate) fn slice(
         if lanczos.dimension() < next && lanczos.can_grow() {
             continue;
         }
-        let ritz = lanczos
-            .ritz()
-            .ok_or_else(|| Trouble::Again("the projected problem did not converge".into()))?;
+        let ritz = lanczos.ritz().ok_or_else(|| Trouble::Again("the projected problem did not converge".into()))?;
         let (below, above) = converged(&ritz, factor.shift, demand);
         if below.len() >= left && above.len() >= right {
             let mut chosen: Vec<usize> = below[..left].iter().rev().copied().collect();
@@ -96,15 +81,10 @@ pub(crate) fn slice(
                 "{below} of {left} pairs below and {above} of {right} above the shift {shift:e} after {dimension} vectors"
             )));
         }
-        let missing = left
-            .saturating_sub(below.len())
-            .max(right.saturating_sub(above.len()));
+        let missing = left.saturating_sub(below.len()).max(right.saturating_sub(above.len()));
         next = dimension + (8 + 3 * missing).clamp(16, 64);
     };
-    found.eigenvalues = chosen
-        .iter()
-        .map(|&k| factor.shift + 1.0 / ritz.values[k])
-        .collect();
+    found.eigenvalues = chosen.iter().map(|&k| factor.shift + 1.0 / ritz.values[k]).collect();
     found.vectors = lanczos.vectors(&ritz, &chosen);
     drop(lanczos);
     normalise(&mut found.vectors);
@@ -113,7 +93,7 @@ pub(crate) fn slice(
         polish(matrix, &mut found);
         normalise(&mut found.vectors);
         let left = residual(matrix, &found);
-        if left > allowed && partial {
+        if left > allowed {
             return Err(Trouble::Again(format!("residual {left:e}, {allowed:e} allowed")));
         }
     }
@@ -123,25 +103,19 @@ pub(crate) fn slice(
 
 /// Converged Ritz values below and above the shift, the closest first, up to the first that has not converged.
 fn converged(ritz: &Ritz, shift: f64, demand: Demand) -> (Vec<usize>, Vec<usize>) {
-    let Ritz {
-        values, residuals, ..
-    } = ritz;
+    let Ritz { values, residuals, .. } = ritz;
     let good = |&k: &usize| {
         let (theta, beta) = (values[k].abs(), residuals[k]);
         // The second is the residual in A after the inverse step; the first keeps the vectors orthogonal and the
         // order of the values right.
-        beta <= 10.0 * demand.tolerance * theta
-            && beta <= 0.1 * demand.tolerance * demand.top * theta * theta
+        beta <= 10.0 * demand.tolerance * theta && beta <= 0.1 * demand.tolerance * demand.top * theta * theta
     };
     debug_assert!(shift.is_finite());
     let mut below: Vec<usize> = (0..values.len()).filter(|&k| values[k] < 0.0).collect();
     let mut above: Vec<usize> = (0..values.len()).filter(|&k| values[k] > 0.0).collect();
     below.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
     above.sort_by(|&a, &b| values[b].total_cmp(&values[a]));
-    (
-        below.into_iter().take_while(good).collect(),
-        above.into_iter().take_while(good).collect(),
-    )
+    (below.into_iter().take_while(good).collect(), above.into_iter().take_while(good).collect())
 }
 
 /// Scales every vector to length 1; the zeros that fill up a block stay zeros.
@@ -151,13 +125,7 @@ fn normalise(vectors: &mut [Block]) {
         for row in block.iter() {
             (0..8).for_each(|k| square[k] += row[k] * row[k]);
         }
-        let scale = square.0.map(|square| {
-            if square > 0.0 {
-                1.0 / square.sqrt()
-            } else {
-                0.0
-            }
-        });
+        let scale = square.0.map(|square| if square > 0.0 { 1.0 / square.sqrt() } else { 0.0 });
         for row in block.iter_mut() {
             (0..8).for_each(|k| row[k] *= scale[k]);
         }
@@ -171,11 +139,7 @@ fn residual(matrix: &Csr, found: &Slice) -> f64 {
     for (block, eigenvalues) in found.vectors.iter().zip(found.eigenvalues.chunks(8)) {
         dispatch::sparse(matrix, block, &mut y, [1.0, 0.0, 0.0]);
         for (k, eigenvalue) in eigenvalues.iter().enumerate() {
-            let square: f64 = block
-                .iter()
-                .zip(&y)
-                .map(|(x, y)| (y[k] - eigenvalue * x[k]).powi(2))
-                .sum();
+            let square: f64 = block.iter().zip(&y).map(|(x, y)| (y[k] - eigenvalue * x[k]).powi(2)).sum();
             most = most.max(square.sqrt());
         }
     }
@@ -214,7 +178,5 @@ fn polish(matrix: &Csr, found: &mut Slice) {
 
 /// An upper bound of A's largest eigenvalue: the largest sum of |entries| of a row (Gershgorin).
 pub(crate) fn norm(matrix: &Csr) -> f64 {
-    (0..matrix.rows())
-        .map(|row| matrix.row(row).map(|(_, value)| value.abs()).sum())
-        .fold(0.0, f64::max)
+    (0..matrix.rows()).map(|row| matrix.row(row).map(|(_, value)| value.abs()).sum()).fold(0.0, f64::max)
 }

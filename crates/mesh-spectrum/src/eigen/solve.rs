@@ -95,10 +95,7 @@ fn forward<A: Arithmetic>(factor: &Packed, s: &Supernode, x: &mut [Row]) {
 /// Lᵀ y = D⁻¹ x for the columns of one supernode.
 #[inline(always)]
 fn backward<A: Arithmetic>(factor: &Packed, s: &Supernode, x: &mut [Row]) {
-    for (row, inverse) in x[s.begin..s.begin + s.width]
-        .iter_mut()
-        .zip(&factor.inverse[s.begin..])
-    {
+    for (row, inverse) in x[s.begin..s.begin + s.width].iter_mut().zip(&factor.inverse[s.begin..]) {
         for k in 0..WIDTH {
             row[k] *= inverse;
         }
@@ -128,12 +125,7 @@ fn backward<A: Arithmetic>(factor: &Packed, s: &Supernode, x: &mut [Row]) {
 
 /// Lᵀ x over all rows below a group of columns, the first `COLUMNS` of the eight.
 #[inline(always)]
-fn above<A: Arithmetic, const COLUMNS: usize>(
-    factor: &Packed,
-    s: &Supernode,
-    group: usize,
-    x: &[Row],
-) -> Small {
+fn above<A: Arithmetic, const COLUMNS: usize>(factor: &Packed, s: &Supernode, group: usize, x: &[Row]) -> Small {
     let mut sum = SMALL_ZERO;
     for g in 0..s.groups {
         let l = &factor.values[s.below + g * s.stride + WIDTH * group..][..COLUMNS];

@@ -5,7 +5,7 @@
 
 use rayon::prelude::*;
 
-use crate::eigen::component::{Component, Pairs, mix};
+use crate::eigen::component::{Component, DENSE_SHARE, Pairs, mix};
 use crate::eigen::weyl::Weyl;
 use crate::eigen::{EigenError, Progress};
 
@@ -35,28 +35,20 @@ pub(crate) fn lowest(
         .zip(&mut solved)
         .zip(&below)
         .enumerate()
-        .map(
-            |(number, ((component, solved), &below))| match solved.take() {
-                Some(mut pairs) => {
-                    pairs.truncate(below);
-                    progress.add(below);
-                    Ok(pairs)
-                }
-                None if 2 * below > component.rows() => {
-                    let mut pairs = solve_dense(component)?;
-                    pairs.truncate(below);
-                    progress.add(below);
-                    Ok(pairs)
-                }
-                None => component.solve_sliced(
-                    top,
-                    below,
-                    tolerance,
-                    mix(seed, number as u64),
-                    progress,
-                ),
-            },
-        )
+        .map(|(number, ((component, solved), &below))| match solved.take() {
+            Some(mut pairs) => {
+                pairs.truncate(below);
+                progress.add(below);
+                Ok(pairs)
+            }
+            None if below as f64 > DENSE_SHARE * component.rows() as f64 => {
+                let mut pairs = solve_dense(component)?;
+                pairs.truncate(below);
+                progress.add(below);
+                Ok(pairs)
+            }
+            None => component.solve_sliced(top, below, tolerance, mix(seed, number as u64), progress),
+        })
         .collect()
 }
 
@@ -72,36 +64,20 @@ fn top(
     let wanted = (count + 1).min(dofs);
     let all_dense = solved.iter().all(Option::is_some);
     if wanted == dofs && all_dense {
-        return Ok((
-            f64::INFINITY,
-            components.iter().map(Component::rows).collect(),
-        ));
+        return Ok((f64::INFINITY, components.iter().map(Component::rows).collect()));
     }
     if all_dense {
-        let mut all: Vec<f64> = solved
-            .iter()
-            .flatten()
-            .flat_map(|pairs| pairs.eigenvalues.iter().copied())
-            .collect();
+        let mut all: Vec<f64> = solved.iter().flatten().flat_map(|pairs| pairs.eigenvalues.iter().copied()).collect();
         all.sort_by(f64::total_cmp);
         let top = all[wanted - 1]; // included
-        let below = solved
-            .iter()
-            .flatten()
-            .map(|pairs| pairs.eigenvalues.iter().filter(|&&e| e <= top).count())
-            .collect();
+        let below =
+            solved.iter().flatten().map(|pairs| pairs.eigenvalues.iter().filter(|&&e| e <= top).count()).collect();
         return Ok((top, below));
     }
     // Counting a few more costs as many pairs more; counting again costs a factorisation.
     let enough = wanted..=(wanted + 4 + count / 40).min(dofs);
     let area: f64 = components.iter().map(|component| component.area).sum();
-    let (mut low, mut high) = (
-        0.0,
-        2.0 * components
-            .iter()
-            .map(|component| component.norm)
-            .fold(0.0, f64::max),
-    );
+    let (mut low, mut high) = (0.0, 2.0 * components.iter().map(|component| component.norm).fold(0.0, f64::max));
     let mut at = Weyl::closed(area).inverse(wanted as f64).min(0.5 * high);
     for round in 0..200 {
         if progress.stopped() {
@@ -131,11 +107,7 @@ fn top(
         }
         let guess = Weyl::through(area, at, total as f64)
             .inverse(*enough.start() as f64 + 0.5 * (*enough.end() - *enough.start()) as f64);
-        at = if guess > low && guess < high && round < 8 {
-            guess
-        } else {
-            0.5 * (low + high)
-        };
+        at = if guess > low && guess < high && round < 8 { guess } else { 0.5 * (low + high) };
         if high - low < 1e-7 * high {
             at = high;
         }
@@ -151,11 +123,7 @@ fn top(
 /// Eigenvalues become what is known of them: the first of a component is 0, and none is negative.
 pub(crate) fn keep_lowest(solved: &mut [Pairs], count: usize) -> Option<f64> {
     for pairs in solved.iter_mut() {
-        pairs
-            .eigenvalues
-            .iter_mut()
-            .enumerate()
-            .for_each(|(k, e)| *e = if k == 0 { 0.0 } else { e.max(0.0) });
+        pairs.eigenvalues.iter_mut().enumerate().for_each(|(k, e)| *e = if k == 0 { 0.0 } else { e.max(0.0) });
     }
     let mut all: Vec<(f64, usize)> = solved
         .iter()

@@ -15,19 +15,13 @@ pub(crate) struct Weyl {
 impl Weyl {
     /// Without a boundary.
     pub(crate) fn closed(area: f64) -> Weyl {
-        Weyl {
-            area: area / (4.0 * PI),
-            edge: 0.0,
-        }
+        Weyl { area: area / (4.0 * PI), edge: 0.0 }
     }
 
     /// Through the point (λ, count).
     pub(crate) fn through(area: f64, lambda: f64, count: f64) -> Weyl {
         let Weyl { area, .. } = Weyl::closed(area);
-        Weyl {
-            area,
-            edge: (count - area * lambda) / lambda.sqrt(),
-        }
+        Weyl { area, edge: (count - area * lambda) / lambda.sqrt() }
     }
 
     /// The λ with N(λ) = count.
@@ -35,11 +29,7 @@ impl Weyl {
         let Weyl { area, edge } = self;
         // The positive root of area x² + edge x = count, x = √λ, without cancellation.
         let root = (edge * edge + 4.0 * area * count).sqrt();
-        let x = if edge > 0.0 {
-            2.0 * count / (edge + root)
-        } else {
-            (root - edge) / (2.0 * area)
-        };
+        let x = if edge > 0.0 { 2.0 * count / (edge + root) } else { (root - edge) / (2.0 * area) };
         x * x
     }
 }
