@@ -62,6 +62,10 @@ pub(crate) struct ModesArgs {
     /// Seed of the random starts; the same seed gives the same modes [default: 1]
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     seed: Option<u64>,
+    /// What makes runs alike: `rotation`, the kind and direction of the deformation wherever it happens, or
+    /// `displacement`, where every place ends up, as in the paper [default: rotation]
+    #[arg(long, value_name = "WHAT")]
+    by: Option<String>,
     /// How to group: kmeans, ward or average [default: kmeans]
     #[arg(long, value_name = "METHOD")]
     method: Option<String>,
@@ -71,10 +75,12 @@ impl ModesArgs {
     pub(crate) fn options(&self) -> Result<ModesOptions, Error> {
         let default = ModesOptions::default();
         let method = self.method.as_deref().map(str::parse).transpose()?;
+        let by = self.by.as_deref().map(str::parse).transpose()?.unwrap_or(default.by);
         Ok(ModesOptions {
             count: self.count,
             seed: self.seed.unwrap_or(default.seed),
             method: method.unwrap_or(default.method),
+            by,
         })
     }
 }

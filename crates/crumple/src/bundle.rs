@@ -39,20 +39,21 @@ const DEPTH_MAX: usize = 32;
 /// that is given by name and is no result file.
 pub fn find(paths: &[PathBuf]) -> Result<Vec<Found>, Error> {
     let mut by_id: BTreeMap<String, Found> = BTreeMap::new();
+    let mut seen = HashSet::new();
     for path in paths {
         let found = if path.is_dir() {
             below(path)?
         } else if path.exists() {
-            vec![Found { id: id_of_file(path)?, path: path.clone(), fault: None }]
+            vec![by_name(path)?]
         } else {
             return Err(Error::NoSuchPath(path.clone()));
         };
         for run in found {
+            // A file that is reached twice is one run, under the id it had first.
+            if !seen.insert(run.path.canonicalize().map_err(io("read", &run.path))?) {
+                continue;
+            }
             if let Some(first) = by_id.get(&run.id) {
-                // The same file given twice is one run; another file under the same id is a mistake.
-                if same_file(&first.path, &run.path) {
-                    continue;
-                }
                 return Err(Error::SameId { id: run.id, first: first.path.clone(), second: run.path });
             }
             by_id.insert(run.id.clone(), run);
@@ -61,16 +62,23 @@ pub fn find(paths: &[PathBuf]) -> Result<Vec<Found>, Error> {
     Ok(by_id.into_values().collect())
 }
 
-fn same_file(a: &Path, b: &Path) -> bool {
-    a == b || matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
-}
-
-fn id_of_file(path: &Path) -> Result<String, Error> {
+/// A file that is given by name.
+fn by_name(path: &Path) -> Result<Found, Error> {
     let absolute = path.canonicalize().map_err(io("read", path))?;
     let folder = absolute.parent().unwrap_or(Path::new("/"));
-    let alone = d3plot::roots(folder)?.families.len() <= 1;
-    let name = if alone { folder.file_name() } else { absolute.file_name() };
-    Ok(name.map_or_else(|| "run".to_owned(), |name| name.to_string_lossy().into_owned()))
+    let roots = d3plot::roots(folder)?;
+    if !roots.families.iter().any(|root| root.path.file_name() == absolute.file_name()) {
+        // Says what it is instead, or opens what only its owner knows to be a result file.
+        d3plot::Family::open(path)?;
+    }
+    let name = if alone(&roots) { folder.file_name() } else { absolute.file_name() };
+    let id = name.map_or_else(|| "run".to_owned(), |name| name.to_string_lossy().into_owned());
+    Ok(Found { id, path: path.to_owned(), fault: None })
+}
+
+/// Whether a folder holds one run, so that the run can be called after it.
+fn alone(roots: &d3plot::Roots) -> bool {
+    roots.families.len() + roots.refused.len() == 1
 }
 
 fn below(folder: &Path) -> Result<Vec<Found>, Error> {
@@ -119,7 +127,7 @@ impl Search<'_> {
         }
         let roots = d3plot::roots(folder)?;
         let here = folder.strip_prefix(self.top).unwrap_or(Path::new(""));
-        let alone = roots.families.len() + roots.refused.len() == 1;
+        let alone = alone(&roots);
         let id = |root: &Path| {
             let path = if alone { here.to_owned() } else { here.join(root.file_name().unwrap_or_default()) };
             path.components().map(|part| part.as_os_str().to_string_lossy()).collect::<Vec<_>>().join("/")

@@ -4,16 +4,17 @@
 //! each label the query is the medoid of its clear runs; every method ranks all other labelled runs by cosine
 //! similarity to the query; a run of another label counts as wrong.
 
+use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::Error;
-use crate::descriptor::{DescribeOptions, FIRST_M, PCA, Select, Threshold, describe, first_k_name};
+use crate::descriptor::{DescribeOptions, FIRST_M, PCA, Rival, Select, Threshold, choose, describe};
 use crate::inputs::Table;
-use crate::modes::{self, ModesOptions, Points, adjusted_rand_index};
+use crate::modes::{self, By, ModesOptions, Points, adjusted_rand_index};
 use crate::rivals::Pca;
 use crate::similarity::cosine;
 use crate::study::{Coefficients, Loaded};
-use crate::target::Named;
+use crate::target::{self, Named, Target};
 
 /// Everything `compare` finds.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -58,6 +59,8 @@ pub struct Row {
 /// How well modes found without labels agree with them.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ModesAgreement {
+    /// What made runs alike.
+    pub by: By,
     /// The method.
     pub method: modes::Method,
     /// Number of modes.
@@ -85,10 +88,12 @@ pub fn compare(loaded: &Loaded, labels: Option<&Table>, threshold: Threshold) ->
             vec!["without labels there is nothing to judge a ranking by: precision is left out".to_owned()],
         ),
     };
+    let arena = |select| Arena::new(loaded, rows, &judges, select, threshold);
+    let arenas = [(Select::Coordinates, arena(Select::Coordinates)?), (Select::Difference, arena(Select::Difference)?)];
     let mut result = Vec::new();
-    for judge in &judges.queries {
-        for select in [Select::Coordinates, Select::Difference] {
-            result.extend(judge_query(loaded, rows, &judges, judge, select, threshold)?);
+    for query in &judges.queries {
+        for (select, arena) in &arenas {
+            result.extend(judge_query(loaded, arena, query, *select, threshold)?);
         }
     }
     let modes = if labels.is_some() { agreements(loaded, rows, &judges)? } else { Vec::new() };
@@ -128,7 +133,7 @@ impl Judge {
             let word = |column| cell(row, column).to_ascii_lowercase();
             clear.is_none_or(|column| matches!(word(column).as_str(), "true" | "1" | "yes"))
         };
-        let distances = Points::of(rows, loaded.basis.facts.area).distances();
+        let distances = Points::by_displacement(rows, loaded.basis.facts.area).distances();
         let queries = names.iter().enumerate().filter_map(|(index, name)| {
             let members = |run: &usize| label_of_row[*run] == Some(index);
             let clear: Vec<usize> =
@@ -155,144 +160,142 @@ impl Judge {
     }
 }
 
-/// A method: from the row of a query to the vectors that the cosine compares.
+/// What the cosine of a method compares.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Method {
-    /// Values on the eigenvectors that this rule gives for the query.
-    Eigenvectors(Choice),
-    /// Scores of as many components as the query's descriptor has eigenvectors.
+    /// Values on the eigenvectors of the query's own descriptor.
+    Descriptor,
+    /// Values on as many eigenvectors of lowest frequency.
+    FirstM,
+    /// Values on all K.
+    FirstK,
+    /// Scores of as many principal components.
     Components,
 }
 
-#[derive(Clone, Copy)]
-enum Choice {
-    Descriptor,
-    FirstM,
-    FirstK,
+/// All runs under one choice of coefficients, ready to be ranked by any method with any run as the query.
+struct Arena<'a> {
+    rows: &'a Coefficients,
+    judge: &'a Judge,
+    /// α or δ of each run, K × 3.
+    values: Vec<Vec<[f64; 3]>>,
+    /// Eigenvectors of each run's own descriptor.
+    chosen: Vec<Vec<usize>>,
+    /// Scores of each run on all principal components.
+    scores: Vec<Vec<f64>>,
 }
 
+impl<'a> Arena<'a> {
+    fn new(
+        loaded: &Loaded,
+        rows: &'a Coefficients,
+        judge: &'a Judge,
+        select: Select,
+        threshold: Threshold,
+    ) -> Result<Self, Error> {
+        let pca = Pca::of(rows, rows.rows());
+        let delta = |row: usize| -> Vec<[f64; 3]> {
+            rows.row(row).as_chunks().0.iter().map(|triple: &[f32; 3]| triple.map(f64::from)).collect()
+        };
+        let chosen = |row: usize| {
+            let target = Target {
+                run: rows.runs[row].clone(),
+                state: rows.states[row] as usize,
+                time: rows.times[row],
+                delta: delta(row),
+            };
+            let original = || target::shape(loaded, &Named { run: target.run.clone(), state: None }, &target);
+            Ok(choose(loaded, select, &target.delta, threshold, original)?.eigenvectors)
+        };
+        let all = 0..rows.rows();
+        Ok(Self {
+            rows,
+            judge,
+            values: all.clone().map(|row| select.values(&loaded.basis, &delta(row))).collect(),
+            chosen: all.clone().into_par_iter().map(chosen).collect::<Result<_, Error>>()?,
+            scores: all.into_par_iter().map(|row| pca.scores(delta(row).as_flattened())).collect(),
+        })
+    }
+
+    /// What is compared of `row` when `query` asks.
+    fn vector(&self, method: Method, query: usize, row: usize) -> Vec<f64> {
+        let (values, chosen) = (&self.values[row], &self.chosen[query]);
+        match method {
+            Method::Descriptor => chosen.iter().flat_map(|&j| values[j - 1]).collect(),
+            Method::FirstM => values[..chosen.len()].as_flattened().to_vec(),
+            Method::FirstK => values.as_flattened().to_vec(),
+            Method::Components => self.scores[row].iter().copied().take(chosen.len()).collect(),
+        }
+    }
+
+    /// All other judged runs, best first; ties by run id.
+    fn ranking(&self, method: Method, query: usize) -> Vec<usize> {
+        let target = self.vector(method, query, query);
+        let taken = |&row: &usize| row != query && (!self.judge.judged || self.judge.label_of_row[row].is_some());
+        let similarity = |row: usize| (row, cosine(&target, &self.vector(method, query, row)));
+        let mut order: Vec<(usize, f64)> = (0..self.rows.rows()).filter(taken).map(similarity).collect();
+        order.sort_by(|a, b| b.1.total_cmp(&a.1).then_with(|| self.rows.runs[a.0].cmp(&self.rows.runs[b.0])));
+        order.into_iter().map(|(row, _)| row).collect()
+    }
+
+    /// Precision at nine and average precision of a ranking for a label.
+    fn quality(&self, order: &[usize], label: usize) -> (f64, f64) {
+        let right: Vec<bool> = order.iter().map(|&row| self.judge.label_of_row[row] == Some(label)).collect();
+        (precision_at(&right, 9), average_precision(&right))
+    }
+
+    /// Mean over every run of a label as the query.
+    fn mean_average_precision(&self, method: Method, label: usize) -> f64 {
+        let members: Vec<usize> =
+            (0..self.rows.rows()).filter(|&row| self.judge.label_of_row[row] == Some(label)).collect();
+        let each: Vec<f64> = members.par_iter().map(|&row| self.quality(&self.ranking(method, row), label).1).collect();
+        each.iter().sum::<f64>() / each.len().max(1) as f64
+    }
+
+    fn row(&self, query: &Query, select: Select, method: Method, rival: &Rival) -> Row {
+        let order = self.ranking(method, query.medoid);
+        let (precision, average) = self.quality(&order, query.index);
+        let judged = self.judge.judged;
+        Row {
+            label: query.label.clone(),
+            query: self.rows.runs[query.medoid].clone(),
+            select: select.word(),
+            method: rival.method.clone(),
+            size: rival.size,
+            rms: rival.errors.rms,
+            max: rival.errors.max,
+            relative: rival.errors.relative,
+            precision_at_9: judged.then_some(precision),
+            average_precision: judged.then_some(average),
+            mean_average_precision: judged.then(|| self.mean_average_precision(method, query.index)),
+            nearest: order.iter().take(9).map(|&row| self.rows.runs[row].clone()).collect(),
+        }
+    }
+}
+
+/// The descriptor and its rivals on one query.
 fn judge_query(
     loaded: &Loaded,
-    rows: &Coefficients,
-    judges: &Judge,
+    arena: &Arena<'_>,
     query: &Query,
     select: Select,
     threshold: Threshold,
 ) -> Result<Vec<Row>, Error> {
-    let named = Named { run: rows.runs[query.medoid].clone(), state: None };
-    let described = describe(loaded, &named, None, None, &DescribeOptions { select, threshold })?;
-    let values = Values::of(loaded, rows, select);
-    let m = described.descriptor.eigenvectors.len();
-    let mut methods = vec![
-        ("descriptor".to_owned(), m, Some(described.descriptor.errors), Method::Eigenvectors(Choice::Descriptor)),
-        (FIRST_M.to_owned(), m, error_of(&described, FIRST_M), Method::Eigenvectors(Choice::FirstM)),
-        (
-            first_k_name(&loaded.basis),
-            loaded.basis.eigenpairs(),
-            error_of(&described, &first_k_name(&loaded.basis)),
-            Method::Eigenvectors(Choice::FirstK),
-        ),
-    ];
-    if select == Select::Difference {
-        // PCA sees displacements, so it stands beside the descriptor of displacements.
-        methods.push((PCA.to_owned(), m, error_of(&described, PCA), Method::Components));
-    }
-    let pca = Pca::of(rows, loaded.basis.eigenpairs().min(rows.rows()));
-    let ranking = |method: &Method, row: usize| -> Result<Vec<usize>, Error> {
-        let chosen = values.select(row, threshold)?;
-        let similarity: Vec<f64> = match method {
-            Method::Eigenvectors(choice) => {
-                let columns: Vec<usize> = match choice {
-                    Choice::Descriptor => chosen,
-                    Choice::FirstM => (1..=chosen.len()).collect(),
-                    Choice::FirstK => (1..=loaded.basis.eigenpairs()).collect(),
-                };
-                let target = values.on(row, &columns);
-                (0..rows.rows()).map(|other| cosine(&target, &values.on(other, &columns))).collect()
-            }
-            Method::Components => {
-                let scores = |row: usize| -> Vec<f64> {
-                    let delta: Vec<f64> = rows.row(row).iter().map(|&x| f64::from(x)).collect();
-                    pca.scores(&delta).into_iter().take(chosen.len()).collect()
-                };
-                let target = scores(row);
-                (0..rows.rows()).map(|other| cosine(&target, &scores(other))).collect()
-            }
+    let named = Named { run: arena.rows.runs[query.medoid].clone(), state: None };
+    let descriptor = describe(loaded, &named, None, None, &DescribeOptions { select, threshold })?.descriptor;
+    let own = Rival { method: "descriptor".into(), size: descriptor.eigenvectors.len(), errors: descriptor.errors };
+    let mut rows = vec![arena.row(query, select, Method::Descriptor, &own)];
+    for rival in &descriptor.rivals {
+        let method = match rival.method.as_str() {
+            FIRST_M => Method::FirstM,
+            // PCA sees displacements, so it stands beside the descriptor of displacements.
+            PCA if select == Select::Coordinates => continue,
+            PCA => Method::Components,
+            _ => Method::FirstK,
         };
-        let mut order: Vec<usize> = (0..rows.rows())
-            .filter(|&other| other != row && (!judges.judged || judges.label_of_row[other].is_some()))
-            .collect();
-        order.sort_by(|&a, &b| similarity[b].total_cmp(&similarity[a]).then_with(|| rows.runs[a].cmp(&rows.runs[b])));
-        Ok(order)
-    };
-    let quality = |order: &[usize]| {
-        let right: Vec<bool> = order.iter().map(|&row| judges.label_of_row[row] == Some(query.index)).collect();
-        (precision_at(&right, 9), average_precision(&right))
-    };
-    methods
-        .into_iter()
-        .map(|(name, size, errors, method)| {
-            let order = ranking(&method, query.medoid)?;
-            let (precision, average) = quality(&order);
-            let members: Vec<usize> =
-                (0..rows.rows()).filter(|&row| judges.label_of_row[row] == Some(query.index)).collect();
-            let mean = if judges.judged {
-                members.iter().map(|&row| Ok(quality(&ranking(&method, row)?).1)).sum::<Result<f64, Error>>()?
-                    / members.len() as f64
-            } else {
-                0.0
-            };
-            let judged = |value: f64| judges.judged.then_some(value);
-            Ok(Row {
-                label: query.label.clone(),
-                query: rows.runs[query.medoid].clone(),
-                select: select.word(),
-                method: name,
-                size,
-                rms: errors.map_or(f64::NAN, |errors| errors.rms),
-                max: errors.map_or(f64::NAN, |errors| errors.max),
-                relative: errors.and_then(|errors| errors.relative),
-                precision_at_9: judged(precision),
-                average_precision: judged(average),
-                mean_average_precision: judged(mean),
-                nearest: order.iter().take(9).map(|&row| rows.runs[row].clone()).collect(),
-            })
-        })
-        .collect()
-}
-
-fn error_of(described: &crate::descriptor::Described, method: &str) -> Option<crate::reconstruct::Errors> {
-    described.descriptor.rivals.iter().find(|rival| rival.method == method).map(|rival| rival.errors)
-}
-
-/// Values of all rows on all eigenvectors.
-struct Values {
-    width: usize,
-    values: Vec<[f64; 3]>,
-}
-
-impl Values {
-    fn of(loaded: &Loaded, rows: &Coefficients, select: Select) -> Self {
-        let width = rows.eigenvectors.len();
-        let delta = |row: usize| -> Vec<[f64; 3]> {
-            rows.row(row).as_chunks().0.iter().map(|triple: &[f32; 3]| triple.map(f64::from)).collect()
-        };
-        Self { width, values: (0..rows.rows()).flat_map(|row| select.values(&loaded.basis, &delta(row))).collect() }
+        rows.push(arena.row(query, select, method, rival));
     }
-
-    fn row(&self, row: usize) -> &[[f64; 3]] {
-        &self.values[row * self.width..(row + 1) * self.width]
-    }
-
-    fn on(&self, row: usize, eigenvectors: &[usize]) -> Vec<f64> {
-        eigenvectors.iter().flat_map(|&j| self.row(row)[j - 1]).collect()
-    }
-
-    fn select(&self, row: usize, threshold: Threshold) -> Result<Vec<usize>, Error> {
-        let left_out = |order: &[usize], m: usize| {
-            order[m..].iter().map(|&j| self.row(row)[j - 1].iter().map(|x| x * x).sum::<f64>()).sum::<f64>().sqrt()
-        };
-        Ok(threshold.select(self.row(row), left_out)?.eigenvectors)
-    }
+    Ok(rows)
 }
 
 /// Share of the first `count` that are right; of all where there are fewer.
@@ -315,12 +318,14 @@ pub fn average_precision(right: &[bool]) -> f64 {
 fn agreements(loaded: &Loaded, rows: &Coefficients, judges: &Judge) -> Result<Vec<ModesAgreement>, Error> {
     let asked = judges.queries.len();
     let mut result = Vec::new();
-    for method in [modes::Method::KMeans, modes::Method::Ward, modes::Method::Average] {
+    let methods = [modes::Method::KMeans, modes::Method::Ward, modes::Method::Average];
+    let ways = [By::Rotation, By::Displacement].into_iter().flat_map(|by| methods.map(|method| (by, method)));
+    for (by, method) in ways {
         for count in [Some(asked), None] {
             if asked < 2 || asked > rows.rows() {
                 continue;
             }
-            let found = modes::modes(&loaded.study, &ModesOptions { count, method, ..Default::default() }, &())?;
+            let found = modes::modes(&loaded.study, &ModesOptions { count, method, by, ..Default::default() }, &())?;
             let mode_of = |run: &str| {
                 found.modes.iter().position(|mode| mode.members.iter().any(|member| member == run)).unwrap_or(0)
             };
@@ -338,6 +343,7 @@ fn agreements(loaded: &Loaded, rows: &Coefficients, judges: &Judge) -> Result<Ve
             let silhouette = found.runs.iter().map(|run| run.silhouette).sum::<f64>() / found.runs.len() as f64;
             let queried = |label: usize| judges.queries.iter().any(|query| query.index == label);
             result.push(ModesAgreement {
+                by,
                 method,
                 count: found.modes.len(),
                 chosen: count.is_none(),

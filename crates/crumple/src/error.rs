@@ -93,6 +93,16 @@ pub enum Error {
         /// User id of the first such node.
         node: u64,
     },
+    /// Coordinates so large that their coefficients cannot be stored.
+    #[error("{run}, state {state} (time {time}): coordinates too large to be a shape of this part")]
+    TooLarge {
+        /// The run.
+        run: String,
+        /// State, counted from 0.
+        state: usize,
+        /// Its time.
+        time: f64,
+    },
     /// A run without coordinates in its states.
     #[error("{run}: its states hold no coordinates")]
     NoCoordinates {
@@ -190,7 +200,7 @@ pub enum Error {
         states: usize,
     },
     /// A run of the study whose content is not what was added.
-    #[error("{run}: its content differs from what the study holds under this id")]
+    #[error("{run}: its result file differs from what the study holds under this id")]
     RunChanged {
         /// The run.
         run: String,
@@ -303,7 +313,7 @@ impl Error {
             Self::NoSurface { .. } => "solids are not read as a surface yet; choose a run with shells",
             Self::UnknownPart { .. } => "name a part by its id or its title, or leave --part out to take all shells",
             Self::OtherMesh { .. } => "a study compares runs on one mesh; make a study of its own for this run",
-            Self::NotFinite { .. } => {
+            Self::NotFinite { .. } | Self::TooLarge { .. } => {
                 "the run broke down there; add it up to an earlier state or leave it out with --skip-bad"
             }
             Self::NoCoordinates { .. } => "write coordinates into the result file (*DATABASE_EXTENT_BINARY: IU = 1)",

@@ -98,7 +98,7 @@ fn coefficient_columns(rows: &Coefficients) -> Vec<(String, Column)> {
     for (at, &j) in rows.eigenvectors.iter().enumerate() {
         for component in 0..3 {
             let values = (0..rows.rows()).map(|row| Some(f64::from(rows.row(row)[3 * at + component]))).collect();
-            columns.push((column_name(j, component), Column::Number(values)));
+            columns.push((column_name(rows.function, j, component), Column::Number(values)));
         }
     }
     columns

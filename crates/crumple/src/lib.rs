@@ -10,6 +10,7 @@
 //! | the surface all runs share | [`reference`] | a run, parts | [`reference::Reference`] |
 //! | eigenbasis | [`basis`] | the reference | [`basis::Basis`] |
 //! | what is kept on disk | [`study`] | all of it | [`study::Study`] |
+//! | how each place has turned | [`rotation`] | a shape | rotation vectors |
 //! | coefficients of every state | [`project`] | a run | [`project::Projected`] |
 //! | deformation modes | [`modes`] | coefficients | [`modes::Modes`] |
 //! | the coefficients that matter | [`descriptor`] | one state | [`descriptor::Descriptor`] |
@@ -35,6 +36,7 @@ pub mod reconstruct;
 pub mod reference;
 pub mod report;
 pub mod rivals;
+pub mod rotation;
 pub mod run;
 pub mod similarity;
 pub mod study;

@@ -11,6 +11,7 @@ use mesh_spectrum::Watch;
 use crate::Error;
 use crate::basis::Basis;
 use crate::reference::Reference;
+use crate::rotation;
 use crate::run::Run;
 
 /// A run, projected.
@@ -33,8 +34,20 @@ pub struct ProjectedState {
     pub time: f64,
     /// δ, K × 3, row-major, in length²; f32 as a study stores it.
     pub delta: Vec<f32>,
+    /// ρ = Φᵀ M r of the rotation field r, K × 3, row-major, in radians × length; f32.
+    pub rotation: Vec<f32>,
     /// What else is known about the state.
     pub measures: Measures,
+}
+
+impl ProjectedState {
+    /// Whether every number is one that can be stored: a run that exploded has finite coordinates and coefficients
+    /// beyond what f32 holds.
+    fn is_finite(&self) -> bool {
+        let Measures { rms, max, captured, rigid_share, strain_median, strain_p95 } = self.measures;
+        self.delta.iter().chain(&self.rotation).all(|x| x.is_finite())
+            && [self.time, rms, max, captured, rigid_share, strain_median, strain_p95].iter().all(|x| x.is_finite())
+    }
 }
 
 /// Numbers about one state that need the whole shape.
@@ -54,7 +67,7 @@ pub struct Measures {
     pub strain_p95: f64,
 }
 
-/// States are projected in batches of at most this many bytes of displacements.
+/// States are projected in batches of at most this many bytes of shapes, displacements and rotations.
 const BATCH_BYTES: usize = 64 << 20;
 /// Vertices a block: the block of Φ in f64 (K × 512 × 8 = 2 MB at K = 500) stays in the second-level cache.
 const BLOCK: usize = 512;
@@ -75,7 +88,7 @@ pub fn project(run: &Run, reference: &Reference, basis: &Basis, watch: &dyn Watc
     if placement.offset_max > 1e-3 * geometry.edge_mean {
         warnings.push(format!("undeformed positions differ from the reference run's by up to {:.3}; displacements count from the reference", placement.offset_max));
     }
-    let batch = (BATCH_BYTES / (24 * basis.vertices())).clamp(1, 64);
+    let batch = (BATCH_BYTES / (72 * basis.vertices())).clamp(1, 64);
     let mut hash = blake3::Hasher::new();
     let mut states = Vec::with_capacity(run.times().len());
     for first in (0..run.times().len()).step_by(batch) {
@@ -93,12 +106,24 @@ pub fn project(run: &Run, reference: &Reference, basis: &Basis, watch: &dyn Watc
             shapes.push(shape);
         }
         let displacements: Vec<Vec<[f64; 3]>> = shapes.iter().map(|shape| geometry.displacement(shape)).collect();
+        let turned: Vec<Vec<[f64; 3]>> = shapes
+            .iter()
+            .map(|shape| rotation::field(reference.mesh.triangles(), reference.mesh.vertices(), shape))
+            .collect();
         let deltas = coefficients_of(basis, &displacements);
-        for (((shape, displacement), delta), &time) in
-            shapes.iter().zip(&displacements).zip(deltas).zip(&run.times()[first..last])
-        {
-            let measures = geometry.measures(shape, displacement, &delta);
-            states.push(ProjectedState { time, delta: delta.iter().flatten().map(|&x| x as f32).collect(), measures });
+        let rotations = coefficients_of(basis, &turned);
+        let narrow = |values: &[[f64; 3]]| values.iter().flatten().map(|&x| x as f32).collect();
+        for (at, (delta, rotation)) in deltas.iter().zip(&rotations).enumerate() {
+            let projected = ProjectedState {
+                time: run.times()[first + at],
+                delta: narrow(delta),
+                rotation: narrow(rotation),
+                measures: geometry.measures(&shapes[at], &displacements[at], delta),
+            };
+            if !projected.is_finite() {
+                return Err(Error::TooLarge { run: run.id().to_owned(), state: first + at, time: projected.time });
+            }
+            states.push(projected);
         }
     }
     if let Some(last) = states.last() {

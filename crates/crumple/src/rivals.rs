@@ -97,6 +97,7 @@ mod tests {
             states: vec![0; values.len()],
             times: vec![0.0; values.len()],
             values: values.concat(),
+            ..Default::default()
         }
     }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::Error;
 use crate::bundle;
-use crate::project::project;
+use crate::project::{coefficients, project};
 use crate::run::Run;
 use crate::study::{Loaded, Rows, Study};
 
@@ -75,13 +75,28 @@ pub fn resolve(loaded: &Loaded, named: &Named) -> Result<Target, Error> {
 /// Positions of a target on the mesh, N × 3, read from its result file.
 ///
 /// # Errors
-/// [`Error::UnknownRun`], reading errors.
-pub fn shape(loaded: &Loaded, named: &Named, state: usize) -> Result<Vec<[f64; 3]>, Error> {
-    if loaded.study.manifest().runs.contains_key(&named.run) {
-        return loaded.study.shape(&loaded.reference, &named.run, state);
+/// [`Error::UnknownRun`]; [`Error::RunChanged`] if the file holds another shape than the coefficients say, so that old
+/// and new are never mixed; reading errors.
+pub fn shape(loaded: &Loaded, named: &Named, target: &Target) -> Result<Vec<[f64; 3]>, Error> {
+    let Loaded { study, reference, basis, .. } = loaded;
+    let run = match study.manifest().runs.get(&named.run) {
+        Some(record) => Run::open(&named.run, &record.path)?,
+        None => open_outside(study, &named.run)?,
+    };
+    if target.state >= run.times().len() {
+        return Err(Error::RunChanged { run: target.run.clone() });
     }
-    let run = open_outside(&loaded.study, &named.run)?;
-    loaded.reference.shape(&run, &loaded.reference.place(&run)?, state)
+    let shape = reference.shape(&run, &reference.place(&run)?, target.state)?;
+    let displacement: Vec<[f64; 3]> =
+        shape.iter().zip(reference.mesh.vertices()).map(|(p, q)| std::array::from_fn(|c| p[c] - q[c])).collect();
+    let now = coefficients(basis, &displacement);
+    let square = |values: &[[f64; 3]]| values.as_flattened().iter().map(|x| x * x).sum::<f64>();
+    let change: f64 = now.as_flattened().iter().zip(target.delta.as_flattened()).map(|(a, b)| (a - b).powi(2)).sum();
+    // Stored coefficients are f32: each is off by at most 6e-8 of itself.
+    if change > 1e-12 * square(&now).max(square(&target.delta)) {
+        return Err(Error::RunChanged { run: target.run.clone() });
+    }
+    Ok(shape)
 }
 
 fn state_of(named: &Named, states: usize) -> Result<usize, Error> {

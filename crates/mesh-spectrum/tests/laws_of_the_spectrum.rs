@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 
 use mesh_spectrum::{EigenOptions, Method};
 use zoo::{
-    Parts, build, checked, copies, distance, flat_torus, flat_torus_spectrum, icosphere, rough, sheet, solve,
+    Parts, book, build, checked, copies, distance, flat_torus, flat_torus_spectrum, icosphere, rough, sheet, solve,
     solve_dense, t_joint, tube,
 };
 
@@ -116,6 +116,20 @@ fn equal_parts_bring_equal_eigenvalues_in_tuples() {
             assert_eq!(phi.chunks(n).filter(|part| part.iter().any(|x| *x != 0.0)).count(), 1);
         }
     }
+}
+
+#[test]
+fn more_equal_modes_than_a_block_is_wide_are_all_found() {
+    // Twelve equal pages on one spine: functions that vanish on the spine and sum to zero over the pages are elevenfold,
+    // functions that are equal on all pages are simple.
+    let basis = solve(&build(book(12, 20, 14)), 150);
+    assert_eq!(basis.certificate.method, Method::Sliced);
+    // Lowest is a quarter wave over the page's height, zero on the spine; then half a wave along all pages together.
+    assert_eq!(basis.clusters[0], 1..12);
+    assert!((basis.eigenvalues[1] / (PI / 28.0).powi(2) - 1.0).abs() < 0.01, "second order in 1/14");
+    assert!((basis.eigenvalues[12] / (PI / 20.0).powi(2) - 1.0).abs() < 0.01, "second order in 1/20");
+    let elevenfold = basis.clusters.iter().filter(|cluster| cluster.len() == 11).count();
+    assert!(elevenfold >= 10, "{:?}", basis.clusters);
 }
 
 #[test]

@@ -61,7 +61,8 @@ impl Analyze {
         let mut descriptors = Vec::new();
         for mode in &modes.modes {
             let named = Named { run: mode.medoid.clone(), state: None };
-            let described = descriptor::describe(&loaded, &named, Some(&mode.name), Some(&mode.name), &describe_options)?;
+            let described =
+                descriptor::describe(&loaded, &named, Some(&mode.name), Some(&mode.name), &describe_options)?;
             descriptor::save(&loaded.study, &described.descriptor)?;
             descriptors.push(described.descriptor);
         }

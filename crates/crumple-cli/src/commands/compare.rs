@@ -63,6 +63,7 @@ fn words(comparison: &Comparison, unit: &str) -> String {
         let rows = comparison.modes.iter().map(|modes| {
             let method = format!("{:?}", modes.method).to_lowercase();
             vec![
+                format!("{:?}", modes.by).to_lowercase(),
                 method,
                 modes.count.to_string(),
                 if modes.chosen { "chosen" } else { "given" }.into(),
@@ -72,7 +73,7 @@ fn words(comparison: &Comparison, unit: &str) -> String {
             ]
         });
         text += "\n\nmodes found without labels, against them (adjusted Rand index)\n";
-        text += &table(&["method", "#modes", "number", "#silhouette", "#ARI", "#ARI, all labels"], rows);
+        text += &table(&["by", "method", "#modes", "number", "#silhouette", "#ARI", "#ARI, all labels"], rows);
     }
     text
 }

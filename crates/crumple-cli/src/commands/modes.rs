@@ -38,7 +38,7 @@ impl Modes {
 pub(crate) fn facts(found: &Found) -> Value {
     json!({
         "modes": found.modes, "outliers": found.outliers(), "runs": found.runs, "tried": found.tried,
-        "count": found.modes.len(), "chosen": !found.given, "method": found.method, "seed": found.seed,
+        "count": found.modes.len(), "chosen": !found.given, "by": found.by, "method": found.method, "seed": found.seed,
     })
 }
 
@@ -51,11 +51,13 @@ pub(crate) fn words(found: &Found, unit: &str) -> String {
             mode.members.len().to_string(),
             mode.medoid.clone(),
             format!("{:.2}", mode.silhouette),
-            format!("{:.1}", mode.spread),
+            format!("{:.2}", mode.spread),
             members,
         ]
     });
-    let mut text = table(&["mode", "#runs", "medoid", "#silhouette", &format!("#spread, {unit}"), "members"], rows);
+    let unit = found.unit(unit);
+    let spread = if unit.is_empty() { "#spread".to_owned() } else { format!("#spread, {unit}") };
+    let mut text = table(&["mode", "#runs", "medoid", "#silhouette", &spread, "members"], rows);
     let outliers = found.outliers();
     if !outliers.is_empty() {
         text += &format!("\noutliers: {}", outliers.join(" "));

@@ -44,7 +44,7 @@ impl Reconstruct {
         let loaded = Loaded::open(&self.study)?;
         let named = Named::parse(&self.run);
         let target = resolve(&loaded, &named)?;
-        let original = target::shape(&loaded, &named, target.state)?;
+        let original = target::shape(&loaded, &named, &target)?;
         let (method, size, shape) = self.shape(&loaded, &target.delta)?;
         let errors = errors(&loaded.reference, &loaded.basis, &original, &shape);
         self.write(&loaded, &shape, &original)?;

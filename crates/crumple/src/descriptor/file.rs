@@ -52,11 +52,12 @@ fn read(path: &Path, study: &Study) -> Result<Descriptor, Error> {
     if descriptor.basis != *expected {
         return Err(Error::OtherBasis { name: descriptor.name, found: descriptor.basis, expected: expected.clone() });
     }
-    if descriptor.eigenvectors.len() != descriptor.values.len()
-        || descriptor.eigenvectors.is_empty()
-        || descriptor.eigenvectors.contains(&0)
-    {
-        return Err(damaged("its eigenvectors and values do not fit together".into()));
+    let (j, values) = (&descriptor.eigenvectors, &descriptor.values);
+    let rising = j.windows(2).all(|pair| pair[0] < pair[1]);
+    let inside = j.first().is_some_and(|&j| j >= 1) && j.last().is_some_and(|&j| j <= study.manifest().eigenpairs);
+    let finite = values.as_flattened().iter().all(|x| x.is_finite());
+    if !rising || !inside || !finite || j.len() != values.len() {
+        return Err(damaged("its eigenvectors and values do not fit together or not the study".into()));
     }
     Ok(descriptor)
 }

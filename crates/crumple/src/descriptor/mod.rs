@@ -144,11 +144,10 @@ pub fn describe(
 ) -> Result<Described, Error> {
     let &DescribeOptions { select, threshold } = options;
     let target = target::resolve(loaded, named)?;
-    let original = target::shape(loaded, named, target.state)?;
+    let original = target::shape(loaded, named, &target)?;
     let (reference, basis) = (&loaded.reference, &loaded.basis);
     let values = select.values(basis, &target.delta);
-    let selection =
-        threshold.select(&values, |order, m| rms_of(loaded, select, &target, &original, &values, &order[..m]))?;
+    let selection = choose(loaded, select, &target.delta, threshold, || Ok(original.clone()))?;
     let eigenvectors = selection.eigenvectors;
     let shape = |eigenvectors: &[usize]| reconstruct(reference, basis, select, eigenvectors, &target.delta);
     let first: Vec<usize> = (1..=basis.eigenpairs()).collect();
@@ -189,25 +188,31 @@ pub fn first_k_name(basis: &Basis) -> String {
     format!("first {}", basis.eigenpairs())
 }
 
-/// RMS error of a reconstruction by Parseval: what lies beyond K, and the coefficients among the K that are left out.
-/// Sums of squares, so nothing cancels.
-fn rms_of(
+/// Applies a threshold to a state's coefficients; `original` reads its shape, which only `error:` needs.
+///
+/// The RMS error of a reconstruction follows from Parseval: what lies beyond K, and the coefficients among the K that
+/// are left out. Sums of squares, so nothing cancels.
+pub(crate) fn choose(
     loaded: &Loaded,
     select: Select,
-    target: &Target,
-    original: &[[f64; 3]],
-    values: &[[f64; 3]],
-    kept: &[usize],
-) -> f64 {
-    let basis = &loaded.basis;
-    let all: Vec<usize> = (1..=basis.eigenpairs()).collect();
-    let beyond =
-        errors(&loaded.reference, basis, original, &reconstruct(&loaded.reference, basis, select, &all, &target.delta))
-            .rms;
+    delta: &[[f64; 3]],
+    threshold: Threshold,
+    original: impl FnOnce() -> Result<Vec<[f64; 3]>, Error>,
+) -> Result<Selection, Error> {
+    let (reference, basis) = (&loaded.reference, &loaded.basis);
+    let values = select.values(basis, delta);
+    let beyond = if let Threshold::Error(_) = threshold {
+        let all: Vec<usize> = (1..=basis.eigenpairs()).collect();
+        errors(reference, basis, &original()?, &reconstruct(reference, basis, select, &all, delta)).rms
+    } else {
+        0.0
+    };
     let always = basis.always_in_reconstruction();
-    let left_out = |j: &usize| !kept.contains(j) && !always.contains(j);
-    let rest: f64 = all.iter().filter(|j| left_out(j)).map(|&j| values[j - 1].iter().map(|x| x * x).sum::<f64>()).sum();
-    (beyond * beyond + rest / basis.facts.area).sqrt()
+    threshold.select(&values, |order, m| {
+        let left_out = order[m..].iter().filter(|j| !always.contains(j));
+        let rest: f64 = left_out.map(|&j| values[j - 1].iter().map(|x| x * x).sum::<f64>()).sum();
+        (beyond * beyond + rest / basis.facts.area).sqrt()
+    })
 }
 
 fn pca_rival(loaded: &Loaded, target: &Target, original: &[[f64; 3]], components: usize) -> Result<Rival, Error> {

@@ -45,7 +45,7 @@ impl Default for Threshold {
 impl Threshold {
     /// Applies the rule to the coefficients of one state, K × 3.
     ///
-    /// `rms_without(order, m)` must give the RMS error of a reconstruction from the first m eigenvectors of `order`;
+    /// `rms_without(order, m)` gives the RMS error of a reconstruction from the first m eigenvectors of `order`;
     /// it is asked only by [`Threshold::Error`].
     ///
     /// # Errors

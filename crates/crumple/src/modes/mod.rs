@@ -1,7 +1,9 @@
 //! Deformation modes: groups of runs that deformed alike, each with the run in its middle.
 //!
-//! The last states of all runs, as points of 3K coefficients δ. Divided by √area, the distance of two points is the
-//! M-weighted RMS distance of the two shapes in the length unit (Parseval).
+//! The last states of all runs become points. By displacement (the paper's way): 3K coefficients δ divided by √area, so
+//! that the distance of two points is the M-weighted RMS distance of the two shapes in the length unit (Parseval). By
+//! rotation: band energies and lowest triples of the rotation field, which say what kind of deformation it is and
+//! which way it goes, wherever on the part it happens.
 
 mod agglomerative;
 mod evidence;
@@ -18,7 +20,8 @@ pub(crate) use evidence::silhouettes;
 pub use file::{load, save};
 
 use crate::Error;
-use crate::study::{Coefficients, Rows, Study};
+use crate::rotation::spectrum;
+use crate::study::{Coefficients, Function, Rows, Study};
 
 /// How to group.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,12 +32,27 @@ pub struct ModesOptions {
     pub seed: u64,
     /// The method.
     pub method: Method,
+    /// What makes runs alike.
+    pub by: By,
 }
 
 impl Default for ModesOptions {
     fn default() -> Self {
-        Self { count: None, seed: 1, method: Method::KMeans }
+        Self { count: None, seed: 1, method: Method::KMeans, by: By::Rotation }
     }
+}
+
+/// What makes runs alike.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum By {
+    /// Kind and direction of the deformation: the spectrum of the rotation field. Distances have no unit, and follow the
+    /// angle between two runs' deviations from the mean of all runs: 0 alike, √2 unrelated, 2 opposite.
+    #[default]
+    Rotation,
+    /// Where every place of the part ends up: all K coefficients of the displacement, as in the paper. Distances are in
+    /// the length unit.
+    Displacement,
 }
 
 /// How runs are grouped.
@@ -56,6 +74,8 @@ pub const COUNT_MAX: usize = 8;
 /// The modes of a study.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Modes {
+    /// What makes runs alike.
+    pub by: By,
     /// The method.
     pub method: Method,
     /// The seed.
@@ -81,7 +101,7 @@ pub struct Mode {
     pub members: Vec<String>,
     /// Mean silhouette of its runs, −1 to 1.
     pub silhouette: f64,
-    /// Root mean square distance of its runs to their mean, in the length unit.
+    /// Root mean square distance of its runs to their mean, in the unit of [`By`].
     pub spread: f64,
 }
 
@@ -92,7 +112,7 @@ pub struct Membership {
     pub run: String,
     /// Name of its mode.
     pub mode: String,
-    /// RMS distance to the medoid of its mode, in the length unit.
+    /// Distance to the medoid of its mode, in the unit of [`By`].
     pub distance: f64,
     /// Silhouette, −1 to 1: how much nearer its own mode is than the next one.
     pub silhouette: f64,
@@ -116,8 +136,12 @@ pub struct Tried {
 /// # Errors
 /// [`Error::TooFewRuns`], [`Error::Value`] for a count that makes no sense, [`Error::Stopped`], reading errors.
 pub fn modes(study: &Study, options: &ModesOptions, watch: &dyn Watch) -> Result<Modes, Error> {
-    let &ModesOptions { count, seed, method } = options;
-    let rows = study.coefficients(None, Rows::Last)?;
+    let &ModesOptions { count, seed, method, by } = options;
+    let function = match by {
+        By::Rotation => Function::Rotation,
+        By::Displacement => Function::Displacement,
+    };
+    let rows = study.coefficients_of(function, None, Rows::Last)?;
     let runs = rows.rows();
     if runs < 3 {
         return Err(Error::TooFewRuns { what: "grouping into modes", needed: 3, have: runs });
@@ -129,8 +153,10 @@ pub fn modes(study: &Study, options: &ModesOptions, watch: &dyn Watch) -> Result
             expected: format!("1 to the number of runs, {runs}"),
         });
     }
-    let area: f64 = study.basis()?.facts.area;
-    let points = Points::of(&rows, area);
+    let points = match by {
+        By::Rotation => Points::by_rotation(&rows),
+        By::Displacement => Points::by_displacement(&rows, study.basis()?.facts.area),
+    };
     let distances = points.distances();
     let counts: Vec<usize> = count.map_or_else(|| (2..=COUNT_MAX.min(runs - 1)).collect(), |count| vec![count]);
     let mut best: Option<(f64, Vec<usize>)> = None;
@@ -202,6 +228,7 @@ fn assemble(
     }
     memberships.sort_by(|a, b| a.run.cmp(&b.run));
     Modes {
+        by: options.by,
         method: options.method,
         seed: options.seed,
         given: options.count.is_some(),
@@ -233,14 +260,15 @@ fn median(mut values: Vec<f64>) -> f64 {
     if values.len().is_multiple_of(2) { (values[middle - 1] + values[middle]) / 2.0 } else { values[middle] }
 }
 
-/// One point a run, in RMS lengths.
+/// One point a run.
 pub(crate) struct Points {
     pub(crate) width: usize,
     pub(crate) values: Vec<f64>,
 }
 
 impl Points {
-    pub(crate) fn of(rows: &Coefficients, area: f64) -> Self {
+    /// Coefficients in RMS lengths.
+    pub(crate) fn by_displacement(rows: &Coefficients, area: f64) -> Self {
         let scale = 1.0 / area.sqrt();
         let (count, width) = (rows.rows(), 3 * rows.eigenvectors.len());
         let values: Vec<f64> = rows.values.iter().map(|&x| f64::from(x) * scale).collect();
@@ -253,6 +281,24 @@ impl Points {
         let r = factor.thin_R();
         let values = (0..count).flat_map(|run| (0..count).map(move |at| r[(at, run)])).collect();
         Self { width: count, values }
+    }
+
+    /// Band energies and lowest triples, each block centred by the mean of the runs and scaled by its root mean square
+    /// deviation, so that kind and direction weigh alike; then of length 1, so that distances follow the angle (cosine)
+    /// and a strong and a weak deformation of one kind stay together.
+    pub(crate) fn by_rotation(rows: &Coefficients) -> Self {
+        let spectra: Vec<(Vec<f64>, Vec<f64>)> = (0..rows.rows())
+            .map(|row| {
+                let rho: Vec<[f64; 3]> =
+                    rows.row(row).as_chunks().0.iter().map(|triple: &[f32; 3]| triple.map(f64::from)).collect();
+                spectrum(&rho)
+            })
+            .collect();
+        let (kinds, directions): (Vec<Vec<f64>>, Vec<Vec<f64>>) = spectra.into_iter().unzip();
+        let (kinds, directions) = (standardised(kinds), standardised(directions));
+        let values: Vec<Vec<f64>> =
+            kinds.into_iter().zip(directions).map(|(kind, way)| unit([kind, way].concat())).collect();
+        Self { width: values.first().map_or(0, Vec::len), values: values.concat() }
     }
 
     pub(crate) fn count(&self) -> usize {
@@ -279,6 +325,28 @@ impl Points {
     }
 }
 
+/// Centred, and divided by the root mean square length of the rows; rows that are all equal become zero.
+fn standardised(mut rows: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+    let count = rows.len() as f64;
+    let mut mean = vec![0.0; rows.first().map_or(0, Vec::len)];
+    rows.iter().for_each(|row| mean.iter_mut().zip(row).for_each(|(mean, x)| *mean += x / count));
+    rows.iter_mut().for_each(|row| row.iter_mut().zip(&mean).for_each(|(x, mean)| *x -= mean));
+    let length = (rows.iter().flatten().map(|x| x * x).sum::<f64>() / count).sqrt();
+    if length > 0.0 {
+        rows.iter_mut().flatten().for_each(|x| *x /= length);
+    }
+    rows
+}
+
+/// Of length 1; a zero row stays zero.
+fn unit(mut row: Vec<f64>) -> Vec<f64> {
+    let length = row.iter().map(|x| x * x).sum::<f64>().sqrt();
+    if length > 0.0 {
+        row.iter_mut().for_each(|x| *x /= length);
+    }
+    row
+}
+
 pub(crate) fn square_distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
 }
@@ -292,6 +360,18 @@ pub(crate) struct Distances {
 impl Distances {
     pub(crate) fn between(&self, a: usize, b: usize) -> f64 {
         f64::from(self.values[a * self.count + b])
+    }
+}
+
+impl FromStr for By {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        match text {
+            "rotation" => Ok(Self::Rotation),
+            "displacement" => Ok(Self::Displacement),
+            _ => Err(Error::Value { name: "--by", value: text.into(), expected: "rotation or displacement".into() }),
+        }
     }
 }
 
@@ -318,6 +398,14 @@ impl Modes {
             asked: name.to_owned(),
             available: self.modes.iter().map(|mode| mode.name.as_str()).collect::<Vec<_>>().join(", "),
         })
+    }
+
+    /// Unit of distances and spreads; empty where they have none.
+    pub fn unit<'a>(&self, length_unit: &'a str) -> &'a str {
+        match self.by {
+            By::Rotation => "",
+            By::Displacement => length_unit,
+        }
     }
 
     /// Ids of the outliers.

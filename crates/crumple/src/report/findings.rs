@@ -12,12 +12,12 @@ use super::picture::{View, picture};
 use super::thin::Thin;
 use crate::Error;
 use crate::descriptor::{self, DescribeOptions, Described, FIRST_M, Rival, Threshold, describe};
-use crate::modes::{Mode, Modes, Tried};
+use crate::modes::{By, Mode, Modes, Tried};
 use crate::project::synthesize;
 use crate::reconstruct::{Errors, displaced};
 use crate::similarity::{Comparer, SimilarityOptions};
 use crate::study::{Loaded, Rows, RunRecord};
-use crate::target::Named;
+use crate::target::{self, Named, Target};
 
 /// What the page gets.
 #[derive(Debug, Clone, Serialize)]
@@ -34,6 +34,7 @@ pub struct Findings {
     modes: Vec<ModeData>,
     silhouettes: Vec<Tried>,
     count_chosen_by: &'static str,
+    alike_by: By,
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -158,7 +159,8 @@ pub fn findings(
             return Err(Error::Stopped);
         }
         let named = Named { run: mode.medoid.clone(), state: None };
-        let described = describe(loaded, &named, Some(&mode.name), Some(&mode.name), &options_of(loaded, mode, options))?;
+        let described =
+            describe(loaded, &named, Some(&mode.name), Some(&mode.name), &options_of(loaded, mode, options))?;
         watch.step("describing modes", done.fetch_add(1, Ordering::Relaxed) + 1, modes.modes.len());
         Ok(described)
     };
@@ -201,6 +203,7 @@ pub fn findings(
         modes: modes_data,
         silhouettes: modes.tried.clone(),
         count_chosen_by: if modes.given { "given" } else { "silhouette" },
+        alike_by: modes.by,
     })
 }
 
@@ -439,16 +442,10 @@ fn shapes(
         wanted.push((format!("{}:first_m", mode.name), thin.shape(&described.first_m)));
     }
     let room = (SHAPE_BYTES / (6 * thin.vertices.len())).saturating_sub(wanted.len());
-    let others = loaded
-        .study
-        .manifest()
-        .runs
-        .iter()
-        .filter(|(id, _)| modes.modes.iter().all(|mode| mode.medoid != **id))
-        .take(room)
-        .collect::<Vec<_>>();
-    let read =
-        |(id, record): (&String, &RunRecord)| Ok((format!("run:{id}"), thin.shape(&last_shape(loaded, id, record)?)));
+    let runs = &loaded.last_states()?.runs;
+    let others: Vec<usize> =
+        (0..runs.len()).filter(|&row| modes.modes.iter().all(|mode| mode.medoid != runs[row])).take(room).collect();
+    let read = |row: usize| Ok((format!("run:{}", runs[row]), thin.shape(&last_shape(loaded, row)?)));
     wanted.extend(others.into_par_iter().map(read).collect::<Result<Vec<_>, Error>>()?);
     let points = || wanted.iter().flat_map(|(_, shape)| shape);
     let origin: [f64; 3] = std::array::from_fn(|c| points().map(|p| p[c]).fold(f64::INFINITY, f64::min));
@@ -468,15 +465,16 @@ fn shapes(
     Ok((MeshData { triangles, vertices: thin.vertices.len(), origin, step, range }, shapes))
 }
 
-/// The last state of a run from its file; where that is gone, from its K coefficients.
-fn last_shape(loaded: &Loaded, id: &str, record: &RunRecord) -> Result<Vec<[f64; 3]>, Error> {
-    let state = record.times.len().saturating_sub(1);
-    if let Ok(shape) = loaded.study.shape(&loaded.reference, id, state) {
-        return Ok(shape);
-    }
-    let rows = loaded.study.coefficients(None, Rows::Run(id))?;
+/// The last state of a run from its file; where that is gone or another one, from its K coefficients.
+fn last_shape(loaded: &Loaded, row: usize) -> Result<Vec<[f64; 3]>, Error> {
+    let rows = loaded.last_states()?;
     let delta: Vec<[f64; 3]> =
-        rows.row(state).as_chunks().0.iter().map(|triple: &[f32; 3]| triple.map(f64::from)).collect();
-    let all: Vec<usize> = (1..=loaded.basis.eigenpairs()).collect();
-    Ok(displaced(&loaded.reference, &synthesize(&loaded.basis, &all, &delta)))
+        rows.row(row).as_chunks().0.iter().map(|triple: &[f32; 3]| triple.map(f64::from)).collect();
+    let run = rows.runs[row].clone();
+    let target = Target { run: run.clone(), state: rows.states[row] as usize, time: rows.times[row], delta };
+    let from_file = target::shape(loaded, &Named { run, state: None }, &target);
+    Ok(from_file.unwrap_or_else(|_| {
+        let all: Vec<usize> = (1..=loaded.basis.eigenpairs()).collect();
+        displaced(&loaded.reference, &synthesize(&loaded.basis, &all, &target.delta))
+    }))
 }

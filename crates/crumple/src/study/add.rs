@@ -1,7 +1,6 @@
 //! Adding runs to a study: project them on all cores, write parts, then the manifest.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 use std::sync::Mutex;
 
 use rayon::prelude::*;
@@ -21,7 +20,9 @@ use mesh_spectrum::Watch;
 pub struct AddOptions<'a> {
     /// A run whose id is there with another content takes its place. Default: that is an error.
     pub replace: bool,
-    /// Runs that cannot be used are left out and reported. Default: nothing is added when one of them is bad.
+    /// Runs that cannot be used are left out and reported, and every part is committed as soon as it is written, so
+    /// that a process that is killed loses little. Default: all runs are projected before any is committed, and nothing
+    /// is added when one of them is bad.
     pub skip_bad: bool,
     /// A table of inputs or responses, kept per run.
     pub params: Option<&'a Table>,
@@ -42,7 +43,7 @@ pub struct Added {
     pub notes: Vec<String>,
 }
 
-/// Runs projected before a part is written: bounds memory, and the work lost when a process is killed.
+/// Runs projected before a part is written; bounds memory.
 const PART_RUNS: usize = 64;
 
 impl Study {
@@ -72,45 +73,66 @@ impl Study {
     ) -> Result<Added, Error> {
         let mut result = Added::default();
         let inputs = self.inputs_of(found, options.params, &mut result.notes)?;
-        let (unchanged, todo): (Vec<&Found>, Vec<&Found>) = found.iter().partition(|run| self.is_here(run));
-        result.unchanged = unchanged.iter().map(|run| run.id.clone()).collect();
-        let projected = self.project_to_parts(&todo, options.skip_bad, watch)?;
-        result.skipped = projected.failures;
-        self.commit(projected.records, &inputs, options.replace, &mut result)?;
-        if projected.stopped { Err(Error::Stopped) } else { Ok(result) }
-    }
-
-    /// Projects runs batch by batch and writes a part for each; nothing refers to the parts yet.
-    fn project_to_parts(&self, todo: &[&Found], skip_bad: bool, watch: &dyn Watch) -> Result<Written, Error> {
+        let here: Vec<bool> = found.par_iter().map(|run| self.is_here(run)).collect();
+        let (unchanged, todo): (Vec<_>, Vec<_>) = found.iter().zip(here).partition(|(_, here)| *here);
+        result.unchanged = unchanged.iter().map(|(run, _)| run.id.clone()).collect();
+        let todo: Vec<&Found> = todo.into_iter().map(|(run, _)| run).collect();
         let (reference, basis) = (self.reference()?, self.basis()?);
         let work = Work { reference, basis, total: todo.len(), done: Mutex::new(0), watch };
-        let mut written = Written::default();
+        let mut waiting = BTreeMap::new();
         for batch in todo.chunks(PART_RUNS) {
-            let (mut projected, mut runs) = (Vec::new(), Vec::new());
-            for (run, outcome) in work.project_all(batch) {
-                match outcome {
-                    Ok(states) => {
-                        projected.push(states);
-                        runs.push(run);
-                    }
-                    Err(Error::Stopped) => written.stopped = true,
-                    Err(error) if todo.len() == 1 && !skip_bad => return Err(error),
-                    Err(error) => written.failures.push((run.id.clone(), error.to_string())),
-                }
-            }
-            if !projected.is_empty() {
-                let part = coefficients::write_part(&self.folder, &self.manifest.basis, &projected)?;
-                let records = projected.into_iter().zip(runs);
-                written.records.extend(records.map(|(states, run)| (run.id.clone(), record(states, run, &part))));
-            }
+            let written = self.write_batch(&work, batch, &options)?;
+            result.skipped.extend(written.failures);
+            waiting.extend(written.records);
             if written.stopped {
-                break;
+                self.commit(waiting, &inputs, options.replace, &mut result)?;
+                return Err(Error::Stopped);
+            }
+            if options.skip_bad {
+                self.commit(std::mem::take(&mut waiting), &inputs, options.replace, &mut result)?;
             }
         }
-        if !written.failures.is_empty() && !skip_bad {
-            return Err(Error::BadRuns { failures: written.failures, total: todo.len() });
+        if !result.skipped.is_empty() && !options.skip_bad {
+            return Err(Error::BadRuns { failures: result.skipped, total: todo.len() });
+        }
+        self.commit(waiting, &inputs, options.replace, &mut result)?;
+        Ok(result)
+    }
+
+    /// Projects a batch of runs and writes a part for it; no manifest refers to the part yet. The error of a single run
+    /// is returned as it is, those of several are gathered.
+    fn write_batch(&self, work: &Work<'_>, batch: &[&Found], options: &AddOptions<'_>) -> Result<Written, Error> {
+        let mut written = Written::default();
+        let (mut projected, mut runs) = (Vec::new(), Vec::new());
+        for (run, outcome) in work.project_all(batch) {
+            match outcome.and_then(|(stamp, states)| self.not_changed(states, options).map(|states| (stamp, states))) {
+                Ok((stamp, states)) => {
+                    projected.push(states);
+                    runs.push((run, stamp));
+                }
+                Err(Error::Stopped) => written.stopped = true,
+                Err(error) if work.total == 1 && !options.skip_bad => return Err(error),
+                Err(error) => written.failures.push((run.id.clone(), error.to_string())),
+            }
+        }
+        if !projected.is_empty() {
+            let part = coefficients::write_part(&self.folder, &self.manifest.basis, &projected)?;
+            let records = projected.into_iter().zip(runs);
+            let record = |(states, (run, stamp)): (Projected, (&Found, String))| {
+                (run.id.clone(), record(states, run, stamp, &part))
+            };
+            written.records.extend(records.map(record));
         }
         Ok(written)
+    }
+
+    /// The run, unless the study holds another content under its id that must not be replaced.
+    fn not_changed(&self, states: Projected, options: &AddOptions<'_>) -> Result<Projected, Error> {
+        let there = self.manifest.runs.get(&states.run);
+        if options.replace || there.is_none_or(|record| record.content == states.content) {
+            return Ok(states);
+        }
+        Err(Error::RunChanged { run: states.run })
     }
 
     /// Removes parts that no manifest names, if no writer is alive that could own them.
@@ -127,9 +149,11 @@ impl Study {
     }
 
     fn is_here(&self, run: &Found) -> bool {
-        self.manifest.runs.get(&run.id).is_some_and(|record| {
-            record.path == absolute(&run.path) && stamp(&run.path).is_some_and(|stamp| stamp == record.stamp)
-        })
+        let same = |record: &RunRecord| {
+            let now = Run::open(&run.id, &run.path).map(|run| stamp(&run));
+            record.path == absolute(&run.path) && now.is_ok_and(|now| now == record.stamp)
+        };
+        self.manifest.runs.get(&run.id).is_some_and(same)
     }
 
     /// Input values by run id.
@@ -235,18 +259,19 @@ struct Work<'a> {
 }
 
 impl Work<'_> {
-    fn project_all<'f>(&self, batch: &[&'f Found]) -> Vec<(&'f Found, Result<Projected, Error>)> {
+    fn project_all<'f>(&self, batch: &[&'f Found]) -> Vec<(&'f Found, Result<(String, Projected), Error>)> {
         batch.par_iter().map(|&run| (run, self.project_one(run))).collect()
     }
 
-    fn project_one(&self, run: &Found) -> Result<Projected, Error> {
+    /// The stamp of the files, taken before they are read: a run that grows meanwhile is looked at again next time.
+    fn project_one(&self, run: &Found) -> Result<(String, Projected), Error> {
         if self.watch.stopped() {
             return Err(Error::Stopped);
         }
         let projected = match &run.fault {
             Some(fault) => Err(Error::Refused { what: fault.what.clone(), remedy: fault.remedy.clone() }),
             None => Run::open(&run.id, &run.path)
-                .and_then(|opened| project(&opened, &self.reference, &self.basis, self.watch)),
+                .and_then(|opened| Ok((stamp(&opened), project(&opened, &self.reference, &self.basis, self.watch)?))),
         };
         if let Ok(mut done) = self.done.lock() {
             *done += 1;
@@ -256,10 +281,10 @@ impl Work<'_> {
     }
 }
 
-fn record(projected: Projected, run: &Found, part: &str) -> RunRecord {
+fn record(projected: Projected, run: &Found, stamp: String, part: &str) -> RunRecord {
     RunRecord {
         path: absolute(&run.path),
-        stamp: stamp(&run.path).unwrap_or_default(),
+        stamp,
         content: projected.content,
         part: part.to_owned(),
         times: projected.states.iter().map(|state| state.time).collect(),
@@ -269,15 +294,15 @@ fn record(projected: Projected, run: &Found, part: &str) -> RunRecord {
     }
 }
 
-/// Length and time of change of each file of a family, as one hash; `None` if it cannot be opened.
-fn stamp(root: &Path) -> Option<String> {
+/// Name, length and time of change of each file of a run, as one hash.
+fn stamp(run: &Run) -> String {
     let mut hasher = blake3::Hasher::new();
-    for (path, bytes) in Run::open("", root).ok()?.files() {
-        let changed = path.metadata().and_then(|metadata| metadata.modified()).ok()?;
+    for (path, bytes) in run.files() {
+        let changed = path.metadata().and_then(|metadata| metadata.modified()).unwrap_or(std::time::UNIX_EPOCH);
         let changed = changed.duration_since(std::time::UNIX_EPOCH).map_or(0, |since| since.as_nanos());
-        hasher.update(path.file_name()?.as_encoded_bytes());
+        hasher.update(path.file_name().unwrap_or_default().as_encoded_bytes());
         hasher.update(&bytes.to_le_bytes());
         hasher.update(&changed.to_le_bytes());
     }
-    Some(hasher.finalize().to_hex()[..16].to_owned())
+    hasher.finalize().to_hex()[..16].to_owned()
 }

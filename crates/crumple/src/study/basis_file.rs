@@ -7,7 +7,7 @@ use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 
 use super::store;
 use crate::Error;
-use crate::basis::Basis;
+use crate::basis::{Basis, BasisFacts};
 use crate::error::io;
 
 /// Its name in a study's folder.
@@ -71,7 +71,18 @@ pub(crate) fn read(path: &Path, id: &str) -> Result<Basis, Error> {
     let baseline: Vec<[f64; 3]> = doubles("baseline")?.as_chunks().0.to_vec();
     let eigenvectors: Vec<f32> =
         tensor("eigenvectors", Dtype::F32)?.data().as_chunks().0.iter().map(|word| f32::from_le_bytes(*word)).collect();
-    if eigenvectors.len() != eigenvalues.len() * mass.len()
+    let facts: BasisFacts = facts;
+    let finite = |values: &[f64]| values.iter().all(|x| x.is_finite());
+    let numbers = finite(&eigenvalues) && finite(&mass) && finite(baseline.as_flattened());
+    if !numbers || !eigenvectors.iter().all(|x| x.is_finite()) {
+        return Err(damaged("it holds values that are not numbers".into()));
+    }
+    let inside = |&(first, last): &(usize, usize)| 1 <= first && first <= last && last <= eigenvalues.len();
+    if !facts.clusters.iter().chain(&facts.close).all(inside) {
+        return Err(damaged("its facts do not fit its eigenvalues".into()));
+    }
+    if mass.is_empty()
+        || eigenvectors.len() != eigenvalues.len() * mass.len()
         || baseline.len() != eigenvalues.len()
         || eigenvalues.is_empty()
     {

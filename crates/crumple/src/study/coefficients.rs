@@ -1,7 +1,7 @@
 //! Coefficient parts on disk: Parquet, one row a state, columns so laid that a descriptor reads only its own.
 //!
-//! `run`, `state`, `time`, six measures, then `d1_x`, `d1_y`, `d1_z`, `d2_x`, …: δ of eigenvector j (counted from 1)
-//! in f32. A part is never changed; its name is the hash of its content.
+//! `run`, `state`, `time`, six measures, then `d1_x`, `d1_y`, `d1_z`, `d2_x`, …: δ of eigenvector j (counted from 1),
+//! and `r1_x`, …: ρ of the rotation field; all in f32. A part is never changed; its name is the hash of its content.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -25,9 +25,21 @@ pub(crate) const FOLDER: &str = "coefficients";
 const COMPONENTS: [char; 3] = ['x', 'y', 'z'];
 const MEASURES: [&str; 6] = ["rms", "max", "captured", "rigid_share", "strain_median", "strain_p95"];
 
+/// The function on the surface that was projected.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Function {
+    /// p − p⁰: coefficients δ, in length².
+    #[default]
+    Displacement,
+    /// The rotation field: coefficients ρ, in radians × length.
+    Rotation,
+}
+
 /// Rows of coefficients, sorted by run and state.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Coefficients {
+    /// What was projected.
+    pub function: Function,
     /// Eigenvectors of the columns, counted from 1.
     pub eigenvectors: Vec<usize>,
     /// Run id of each row.
@@ -61,6 +73,7 @@ impl Coefficients {
             states: order.iter().map(|&row| self.states[row]).collect(),
             times: order.iter().map(|&row| self.times[row]).collect(),
             values: order.iter().flat_map(|&row| self.row(row).iter().copied()).collect(),
+            function: self.function,
             eigenvectors: self.eigenvectors,
         }
     }
@@ -88,7 +101,7 @@ pub(crate) fn write_part(folder: &Path, basis: &str, runs: &[Projected]) -> Resu
         "crumple.basis".to_owned(),
         basis.to_owned(),
     )]));
-    let file = std::fs::File::create(&staged.path).map_err(io("write", folder))?;
+    let file = staged.create(folder)?;
     let mut writer = ArrowWriter::try_new(std::io::BufWriter::new(file), batch.schema(), Some(properties.build()))
         .map_err(internal)?;
     writer.write(&batch).map_err(internal)?;
@@ -124,16 +137,26 @@ fn record_batch(runs: &[Projected]) -> Result<RecordBatch, Error> {
             [m.rms, m.max, m.captured, m.rigid_share, m.strain_median, m.strain_p95][index]
         }))));
     }
-    for column in 0..width {
-        fields.push(Field::new(column_name(column / 3 + 1, column % 3), DataType::Float32, false));
-        columns.push(Arc::new(Float32Array::from_iter_values(rows.iter().map(|row| row.2.delta[column]))));
+    for function in [Function::Displacement, Function::Rotation] {
+        for column in 0..width {
+            let values = rows.iter().map(|(_, _, state)| match function {
+                Function::Displacement => state.delta[column],
+                Function::Rotation => state.rotation[column],
+            });
+            fields.push(Field::new(column_name(function, column / 3 + 1, column % 3), DataType::Float32, false));
+            columns.push(Arc::new(Float32Array::from_iter_values(values)));
+        }
     }
     RecordBatch::try_new(Arc::new(Schema::new(fields)), columns).map_err(|error| Error::Internal(error.to_string()))
 }
 
 /// Name of the column of an eigenvector (counted from 1) and a component (0, 1, 2).
-pub fn column_name(eigenvector: usize, component: usize) -> String {
-    format!("d{eigenvector}_{}", COMPONENTS[component])
+pub fn column_name(function: Function, eigenvector: usize, component: usize) -> String {
+    let letter = match function {
+        Function::Displacement => 'd',
+        Function::Rotation => 'r',
+    };
+    format!("{letter}{eigenvector}_{}", COMPONENTS[component])
 }
 
 /// Reads the rows of a part that `keep` accepts (by run and state), only the columns of the named eigenvectors, and
@@ -146,9 +169,10 @@ pub(crate) fn read_part<R: ChunkReader + 'static>(
 ) -> Result<(), Error> {
     let damaged = |what: String| Error::Damaged { path: path.to_owned(), what };
     let builder = ParquetRecordBatchReaderBuilder::try_new(source).map_err(|error| damaged(error.to_string()))?;
+    let function = into.function;
     let names = ["run", "state", "time"].map(str::to_owned).into_iter();
     let names: Vec<String> =
-        names.chain(into.eigenvectors.iter().flat_map(|&j| (0..3).map(move |c| column_name(j, c)))).collect();
+        names.chain(into.eigenvectors.iter().flat_map(|&j| (0..3).map(move |c| column_name(function, j, c)))).collect();
     let schema = builder.parquet_schema();
     let by_name: std::collections::HashMap<&str, usize> =
         schema.columns().iter().zip(0..).map(|(column, leaf)| (column.name(), leaf)).collect();

@@ -24,6 +24,10 @@ pub struct Manifest {
     pub crumple: String,
     /// Content name of the basis.
     pub basis: String,
+    /// Number of eigenpairs K.
+    pub eigenpairs: usize,
+    /// Number of vertices N.
+    pub vertices: usize,
     /// The files that never change, by path below the study's folder.
     pub files: BTreeMap<String, FileRecord>,
     /// Columns of the input tables, in the order they came.

@@ -33,7 +33,7 @@ use serde::{Deserialize, Serialize};
 
 pub use add::{AddOptions, Added};
 pub use check::{Checkup, check};
-pub use coefficients::{Coefficients, column_name};
+pub use coefficients::{Coefficients, Function, column_name};
 pub use manifest::{FileRecord, LAYOUT, Manifest, RunRecord};
 pub use mesh_file::write_shape;
 pub use tables::write_columns;
@@ -104,6 +104,15 @@ impl Loaded {
     /// As [`Study::reference`], [`Study::basis`].
     pub fn of(study: Study) -> Result<Self, Error> {
         let (reference, basis) = (study.reference()?, study.basis()?);
+        let (vertices, eigenpairs) = (study.manifest.vertices, study.manifest.eigenpairs);
+        if reference.vertices() != vertices || basis.vertices() != vertices || basis.eigenpairs() != eigenpairs {
+            let what = format!(
+                "mesh, basis and manifest do not fit together: {} and {} vertices, {vertices} expected",
+                reference.vertices(),
+                basis.vertices()
+            );
+            return Err(Error::Damaged { path: study.folder.join(basis_file::FILE), what });
+        }
         Ok(Self { study, reference, basis, last_states: OnceLock::new() })
     }
 }
@@ -192,6 +201,8 @@ impl Study {
         let manifest = Manifest {
             layout: LAYOUT,
             crumple: env!("CARGO_PKG_VERSION").into(),
+            eigenpairs: basis.eigenpairs(),
+            vertices: basis.vertices(),
             basis: basis.id,
             files,
             inputs: Vec::new(),
@@ -266,15 +277,28 @@ impl Study {
     /// # Errors
     /// [`Error::Io`], [`Error::Damaged`].
     pub fn coefficients(&self, eigenvectors: Option<&[usize]>, rows: Rows<'_>) -> Result<Coefficients, Error> {
+        self.coefficients_of(Function::Displacement, eigenvectors, rows)
+    }
+
+    /// The same for the function named.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Damaged`].
+    pub fn coefficients_of(
+        &self,
+        function: Function,
+        eigenvectors: Option<&[usize]>,
+        rows: Rows<'_>,
+    ) -> Result<Coefficients, Error> {
         let all: Vec<usize>;
         let eigenvectors = match eigenvectors {
             Some(eigenvectors) => eigenvectors,
             None => {
-                all = (1..=self.basis()?.eigenpairs()).collect();
+                all = (1..=self.manifest.eigenpairs).collect();
                 &all
             }
         };
-        let mut result = Coefficients { eigenvectors: eigenvectors.to_vec(), ..Default::default() };
+        let mut result = Coefficients { function, eigenvectors: eigenvectors.to_vec(), ..Default::default() };
         let parts: std::collections::BTreeSet<&str> = self
             .manifest
             .runs
@@ -314,23 +338,6 @@ impl Study {
                 near: self.manifest.runs.keys().filter(like).take(5).cloned().collect(),
             }
         })
-    }
-
-    /// Opens the result file of a run of the study and reads one state of it on the mesh, N × 3.
-    ///
-    /// # Errors
-    /// [`Error::UnknownRun`], [`Error::UnknownState`], reading errors.
-    pub fn shape(&self, reference: &Reference, run: &str, state: usize) -> Result<Vec<[f64; 3]>, Error> {
-        let record = self.record(run)?;
-        let opened = Run::open(run, &record.path)?;
-        if state >= opened.times().len() {
-            return Err(Error::UnknownState {
-                run: run.to_owned(),
-                state: state.to_string(),
-                states: opened.times().len(),
-            });
-        }
-        reference.shape(&opened, &reference.place(&opened)?, state)
     }
 
     /// Takes up what another process, or this one, has committed since.

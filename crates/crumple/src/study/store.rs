@@ -1,9 +1,9 @@
 //! Files that are whole at every moment: written beside, synced, renamed; and the locks of a study.
 
 use std::fs::File;
+use std::hash::{BuildHasher, Hasher, RandomState};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::Error;
 use crate::error::io;
@@ -25,8 +25,7 @@ pub(crate) fn write_whole<T>(
         return Ok(value);
     }
     let staged = Staged::beside(path);
-    let file = File::create(&staged.path).map_err(io("write", path))?;
-    let mut writer = BufWriter::new(file);
+    let mut writer = BufWriter::new(staged.create(path)?);
     let value = write(&mut writer)?;
     let file = writer.into_inner().map_err(|error| io("write", path)(error.into_error()))?;
     file.sync_all().map_err(io("write", path))?;
@@ -50,10 +49,15 @@ pub(crate) struct Staged {
 
 impl Staged {
     pub(crate) fn beside(path: &Path) -> Self {
-        static COUNT: AtomicU64 = AtomicU64::new(0);
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let count = COUNT.fetch_add(1, Ordering::Relaxed);
-        Self { path: path.with_file_name(format!(".{name}.tmp-{}-{count}", std::process::id())) }
+        // Random, not the process id: writers on several hosts may share it.
+        let nonce = RandomState::new().build_hasher().finish();
+        Self { path: path.with_file_name(format!(".{name}.tmp-{nonce:016x}")) }
+    }
+
+    /// Makes the file; `path`, the one it stands for, is named in the error.
+    pub(crate) fn create(&self, path: &Path) -> Result<File, Error> {
+        File::create_new(&self.path).map_err(io("write", path))
     }
 
     pub(crate) fn rename_to(self, path: &Path) -> Result<(), Error> {

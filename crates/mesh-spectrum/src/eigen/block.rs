@@ -148,6 +148,28 @@ fn update_panel<A: Arithmetic>(q: &[Row], c: &Small, w: &mut [Row]) {
     }
 }
 
+/// W = W C in place.
+#[inline(always)]
+pub(crate) fn scale_with<A: Arithmetic>(c: &Small, w: &mut [Row]) {
+    let (tiles, rest) = w.as_chunks_mut::<8>();
+    for w in tiles {
+        let mut sum = SMALL_ZERO;
+        for a in 0..WIDTH {
+            for r in 0..8 {
+                add_scaled::<A>(&mut sum[r], w[r][a], &c[a]);
+            }
+        }
+        *w = sum.map(Row);
+    }
+    for w in rest {
+        let mut sum = [0.0; WIDTH];
+        for a in 0..WIDTH {
+            add_scaled::<A>(&mut sum, w[a], &c[a]);
+        }
+        w.0 = sum;
+    }
+}
+
 /// Y = a·A X + b·X + c·Y for a sparse symmetric A: the product itself, a residual, or a step of a Chebyshev recurrence.
 #[inline(always)]
 pub(crate) fn sparse_with<A: Arithmetic>(matrix: &Csr, x: &[Row], y: &mut [Row], [a, b, c]: [f64; 3]) {
@@ -208,6 +230,8 @@ pub(crate) mod dispatch {
         gram = gram_with(blocks: &[&[Row]], ws: &[&[Row]], out: &mut [Small]);
         /// W_i += Σ_k Q_k C_ki, the C as `gram` returns them.
         update = update_with(blocks: &[&[Row]], c: &[Small], ws: &mut [&mut [Row]]);
+        /// W = W C in place.
+        scale = scale_with(c: &Small, w: &mut [Row]);
         /// Y = a·A X + b·X + c·Y for a sparse symmetric A.
         sparse = sparse_with(matrix: &Csr, x: &[Row], y: &mut [Row], abc: [f64; 3]);
         /// X = (L D Lᵀ)⁻¹ X; `x` has one row more than the matrix.
@@ -258,4 +282,64 @@ pub(crate) fn cholesky(g: &Small) -> Option<(Small, Small)> {
         }
     }
     Some((r, inverse))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn block(rows: usize, seed: usize) -> Block {
+        let value = |i: usize, k: usize| ((i * 7919 + k * 104_729 + seed * 31) % 1009) as f64 / 1009.0 - 0.5;
+        (0..rows).map(|i| Row(std::array::from_fn(|k| value(i, k)))).collect()
+    }
+
+    fn close(a: &[Row], b: &[Row], rows: usize) {
+        for (a, b) in a.iter().zip(b) {
+            for k in 0..WIDTH {
+                // Sums of up to `rows` products below ¼, rounded once or twice each.
+                assert!((a[k] - b[k]).abs() <= 1e-16 * rows as f64, "{} is not {}", a[k], b[k]);
+            }
+        }
+    }
+
+    #[test]
+    fn every_compiled_kind_computes_the_same_but_for_rounding() {
+        for rows in [1, 7, 8, 9, 127, 128, 129, 1000] {
+            let (q, p, w) = (block(rows, 1), block(rows, 2), block(rows, 3));
+            let blocks: [&[Row]; 2] = [&q, &p];
+            let (mut plain, mut fast) = ([SMALL_ZERO; 4], [SMALL_ZERO; 4]);
+            gram_with::<Plain>(&blocks, &[&w, &q], &mut plain);
+            dispatch::gram(&blocks, &[&w, &q], &mut fast);
+            close(plain.map(|c| c.map(Row)).as_flattened(), fast.map(|c| c.map(Row)).as_flattened(), rows);
+            let direct: f64 = p.iter().zip(&w).map(|(p, w)| p[3] * w[5]).sum();
+            assert!((plain[2][3][5] - direct).abs() <= 1e-16 * rows as f64);
+
+            let (mut a, mut b) = ([w.clone(), p.clone()], [w.clone(), p.clone()]);
+            let c: Vec<Small> = (0..4)
+                .map(|k| block(WIDTH, k).iter().map(|row| row.0).collect::<Vec<_>>().try_into().unwrap())
+                .collect();
+            update_with::<Plain>(&blocks, &c, &mut a.each_mut().map(|a| &mut a[..]));
+            dispatch::update(&blocks, &c, &mut b.each_mut().map(|b| &mut b[..]));
+            close(&a[1], &b[1], 40);
+            scale_with::<Plain>(&c[0], &mut a[0]);
+            dispatch::scale(&c[0], &mut b[0]);
+            close(&a[0], &b[0], 100);
+        }
+    }
+
+    #[test]
+    fn cholesky_gives_a_factor_and_its_inverse() {
+        let w = block(100, 4);
+        let g = gram_of(&w, &w);
+        let (r, inverse) = cholesky(&g).unwrap();
+        for (i, row) in product(&transpose(&r), &r).iter().enumerate() {
+            for (j, entry) in row.iter().enumerate() {
+                assert!((entry - g[i][j]).abs() < 1e-14, "rounding of entries below 10");
+                assert!((product(&r, &inverse)[i][j] - f64::from(i == j)).abs() < 1e-13);
+            }
+        }
+        let mut twice = w;
+        twice.iter_mut().for_each(|row| row[6] = 2.0 * row[1]);
+        assert!(cholesky(&gram_of(&twice, &twice)).is_none(), "a dependent column");
+    }
 }

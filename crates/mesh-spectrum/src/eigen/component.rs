@@ -13,8 +13,8 @@ use crate::eigen::weyl::Weyl;
 use crate::eigen::{EigenError, Progress};
 use crate::operator::{Csr, Operator};
 
-/// Pairs on either side of a shift. Fewer: more factorisations; more: larger spaces.
-const PAIRS_A_SIDE: usize = 32;
+/// Pairs on either side of a shift. Fewer: more factorisations; more: larger spaces. Between 25 and 40 the time is flat.
+const PAIRS_A_SIDE: usize = 28;
 
 /// Up to this size the dense solver takes no longer than a slice.
 pub(crate) const DENSE_BELOW: usize = 400;
@@ -32,6 +32,10 @@ const OVERLAP: usize = 2;
 const GROWTH_MAX: f64 = 1e4;
 const PIVOT_MIN: f64 = 5e-3;
 
+/// Factors are kept from the count to the slice up to this size (about 50 MB each at most); beyond, memory is dearer
+/// than a second factorisation, a tenth of a slice's time.
+const KEEP_FACTORS_UP_TO: usize = 100_000;
+
 /// A connected component of the operator.
 pub(crate) struct Component {
     /// A / `unit`, in elimination order when the component is solved in slices.
@@ -47,6 +51,13 @@ pub(crate) struct Component {
     /// Gershgorin's bound of the largest eigenvalue, 1/ℓ².
     pub(crate) norm: f64,
     symbolic: Option<Symbolic>,
+}
+
+/// Where a slice is, and the eigenvalues below.
+struct Shift {
+    at: f64,
+    below: usize,
+    factor: Option<Factor>,
 }
 
 /// The lowest pairs of a component.
@@ -194,29 +205,34 @@ impl Component {
         attempt: usize,
         progress: &Progress,
     ) -> Result<Pairs, Trouble> {
-        let factors = self.shifts(top, count, attempt, progress)?;
-        let mut counts: Vec<(f64, usize)> = factors.iter().map(|factor| (factor.shift, factor.below)).collect();
-        let last = factors.len() - 1;
+        let shifts = self.shifts(top, count, attempt, progress)?;
+        let mut counts: Vec<(f64, usize)> = shifts.iter().map(|shift| (shift.at, shift.below)).collect();
+        let last = shifts.len() - 1;
         let overlap = OVERLAP << attempt;
         let half = |between: usize| (between.div_ceil(2) + overlap).min(between);
-        let slices: Vec<Slice> = factors
+        let slices: Vec<Slice> = shifts
             .into_par_iter()
             .enumerate()
-            .map(|(i, factor)| {
+            .map(|(i, shift)| {
+                if progress.stopped() {
+                    return Err(Trouble::Fatal(EigenError::Stopped));
+                }
                 let left = if i == 0 { counts[0].1 } else { half(counts[i].1 - counts[i - 1].1) };
                 let right = if i == last { count - counts[last].1 } else { half(counts[i + 1].1 - counts[i].1) };
                 let seed = mix(seed, 100 + i as u64);
+                let out_of_memory = || Trouble::Fatal(EigenError::OutOfMemory { dofs: self.rows() }); // it could be factored before
+                let factor = shift.factor.or_else(|| self.factor(shift.at)).ok_or_else(out_of_memory)?;
                 slice(&self.matrix, &factor, Demand { left, right, top, tolerance, seed }, progress)
             })
             .collect::<Result<_, Trouble>>()?;
         counts.push((top, count));
-        let (eigenvalues, vectors) = assemble(&slices, top, tolerance)?;
+        let (eigenvalues, vectors) = assemble(slices, top, tolerance)?;
         let counts = check_counts(&eigenvalues, &counts)?;
         Ok(Pairs { eigenvalues, vectors, counts, dense: false })
     }
 
     /// Chooses shifts so that every slice has about `PAIRS_A_SIDE` pairs on each side, and factors at them. Ascending.
-    fn shifts(&self, top: f64, count: usize, attempt: usize, progress: &Progress) -> Result<Vec<Factor>, Trouble> {
+    fn shifts(&self, top: f64, count: usize, attempt: usize, progress: &Progress) -> Result<Vec<Shift>, Trouble> {
         let slices = (count as f64 / (2 * PAIRS_A_SIDE) as f64).round().max(1.0);
         let weyl = Weyl::through(self.area * self.unit, top, count as f64);
         let spacing = top / count as f64;
@@ -225,38 +241,38 @@ impl Component {
                 return Err(Trouble::Fatal(EigenError::Stopped));
             }
             let shift = (shift + 0.21 * spacing * attempt as f64).min(top);
-            self.factor_near(shift, spacing)
-                .ok_or_else(|| Trouble::Again(format!("no factorisation near the shift {shift:e}")))
+            let factor = self
+                .factor_near(shift, spacing)
+                .ok_or_else(|| Trouble::Again(format!("no factorisation near the shift {shift:e}")))?;
+            let (at, below) = (factor.shift, factor.below);
+            Ok(Shift { at, below, factor: (self.rows() <= KEEP_FACTORS_UP_TO).then_some(factor) })
         };
         let wanted: Vec<f64> =
             (0..slices as usize).map(|i| weyl.inverse((i as f64 + 0.5) * count as f64 / slices)).collect();
-        let mut factors = wanted.into_par_iter().map(place).collect::<Result<Vec<_>, _>>()?;
+        let mut shifts = wanted.into_par_iter().map(place).collect::<Result<Vec<_>, _>>()?;
         for _ in 0..6 {
-            factors.sort_by(|a, b| a.shift.total_cmp(&b.shift));
+            shifts.sort_by(|a, b| a.at.total_cmp(&b.at));
             // Where Weyl's law was too far off, halve the interval.
             let mut more = Vec::new();
-            let ends = |i: usize| {
-                if i == 0 { (0.0, 0) } else { (factors[i - 1].shift, factors[i - 1].below) }
-            };
-            for i in 0..=factors.len() {
-                let (low, below) = ends(i);
-                let (high, above) = factors.get(i).map_or((top, count), |factor| (factor.shift, factor.below));
-                let sides = if i == 0 || i == factors.len() { 1 } else { 2 };
-                if above - below > PAIRS_A_SIDE * sides * 17 / 10 && high - low > 1e-5 * top {
+            for i in 0..=shifts.len() {
+                let (low, below) = i.checked_sub(1).map_or((0.0, 0), |i| (shifts[i].at, shifts[i].below));
+                let (high, above) = shifts.get(i).map_or((top, count), |shift| (shift.at, shift.below));
+                let sides = if i == 0 || i == shifts.len() { 1 } else { 2 };
+                if above.saturating_sub(below) > PAIRS_A_SIDE * sides * 17 / 10 && high - low > 1e-5 * top {
                     more.push(0.5 * (low + high));
                 }
             }
             if more.is_empty() {
                 break;
             }
-            factors.extend(more.into_par_iter().map(place).collect::<Result<Vec<_>, _>>()?);
+            shifts.extend(more.into_par_iter().map(place).collect::<Result<Vec<_>, _>>()?);
         }
-        factors.sort_by(|a, b| a.shift.total_cmp(&b.shift));
-        factors.retain(|factor| factor.shift < top && factor.below <= count);
-        if factors.windows(2).any(|pair| pair[0].below > pair[1].below) || factors.is_empty() {
+        shifts.sort_by(|a, b| a.at.total_cmp(&b.at));
+        shifts.retain(|shift| shift.at < top && shift.below <= count);
+        if shifts.windows(2).any(|pair| pair[0].below > pair[1].below) || shifts.is_empty() {
             return Err(Trouble::Again("inertia counts are not monotone".into()));
         }
-        Ok(factors)
+        Ok(shifts)
     }
 }
 

@@ -132,9 +132,7 @@ impl<'a> Lanczos<'a> {
             if most <= 1e-13 * self.scale {
                 break; // an invariant subspace: what is left of W is rounding
             }
-            let mut q = vec![ZERO; self.n];
-            dispatch::update(&[&*w], &[inverse], &mut [&mut q]);
-            *w = q;
+            dispatch::scale(&inverse, w);
             total = Some(total.map_or(r, |total| product(&r, &total)));
             if most / least < 50.0 {
                 return total.unwrap_or(r);

@@ -33,3 +33,17 @@ impl Weyl {
         x * x
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn inverse_undoes_the_law() {
+        for (area, lambda, count) in [(100.0, 3.0, 40.0), (100.0, 3.0, 15.0), (1e-9, 1e12, 70.0)] {
+            let weyl = Weyl::through(area, lambda, count);
+            assert!((weyl.inverse(count) / lambda - 1.0).abs() < 1e-12, "a square root and a quotient");
+            assert!(weyl.inverse(0.5 * count) < lambda);
+        }
+    }
+}

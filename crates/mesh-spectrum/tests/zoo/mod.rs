@@ -128,6 +128,27 @@ pub(crate) fn t_joint(n: usize) -> Parts {
     (vertices, triangles)
 }
 
+/// Sheets of length × height cells that share one edge line, like the pages of a book.
+pub(crate) fn book(pages: usize, length: usize, height: usize) -> Parts {
+    let mut vertices: Vec<[f64; 3]> = (0..=length).map(|j| [0.0, 0.0, j as f64]).collect();
+    let mut triangles = Vec::new();
+    for page in 0..pages {
+        let (s, c) = (std::f64::consts::TAU * page as f64 / pages as f64).sin_cos();
+        let first = vertices.len();
+        let at = |k: usize, j: usize| if k == 0 { j as u32 } else { (first + (k - 1) * (length + 1) + j) as u32 };
+        for k in 1..=height {
+            vertices.extend((0..=length).map(|j| [c * k as f64, s * k as f64, j as f64]));
+        }
+        for k in 0..height {
+            for j in 0..length {
+                let (a, b, d, e) = (at(k, j), at(k + 1, j), at(k + 1, j + 1), at(k, j + 1));
+                triangles.extend([[a, b, d], [a, d, e]]);
+            }
+        }
+    }
+    (vertices, triangles)
+}
+
 pub(crate) fn build((vertices, triangles): Parts) -> Operator {
     operator(&Mesh::new(vertices, triangles).unwrap(), &OperatorOptions::default()).unwrap()
 }

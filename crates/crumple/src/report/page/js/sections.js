@@ -30,7 +30,7 @@ function modesSection(showMode) {
   if (!modes.length) return null;
   const controls = stage ? el("div", { class: "controls" }, displacementLegend(), tick("turn all shapes together", turnAll, (on) => { turnAll = on; }), el("button", { type: "button", onclick: resetShapes }, "reset view")) : el("div", { class: "controls" }, displacementLegend());
   return el("section", { id: "modes" },
-    el("p", { class: "lead" }, "Runs that end in a similar shape form a mode. The picture is each mode’s most typical run" + (stage ? "; drag to turn it, click and scroll to zoom." : frame ? "; this browser has no WebGL, so it cannot be turned." : ".")),
+    el("p", { class: "lead" }, (findings.alike_by === "rotation" ? "Runs that bend, fold and turn in the same way form a mode, wherever on the part they do it." : "Runs that end in a similar shape form a mode.") + " The picture is each mode’s most typical run" + (stage ? "; drag to turn it, click and scroll to zoom." : frame ? "; this browser has no WebGL, so it cannot be turned." : ".")),
     controls, el("div", { class: "cards" }, modes.map((mode) => modeCard(mode, showMode))));
 }
 
