@@ -173,7 +173,7 @@ fn compare_and_describe_choose_alike() {
         };
         world.write(&format!("run_{run:02}"), &model.family(2, deform));
     }
-    let loaded = world.study(60);
+    let loaded = world.study(120);
     let labels = world.path("labels.csv");
     let rows: String = (0..14).map(|run| format!("run_{run:02},{}\n", ["even", "odd"][run % 2])).collect();
     std::fs::write(&labels, format!("run,label\n{rows}")).unwrap();

@@ -88,6 +88,34 @@ fn another_seed_gives_the_same_spectrum() {
     assert!(zoo::subspace_distance(&a, &b, &built.vertex_mass, 1e-5) < 1e-9);
 }
 
+#[test]
+fn a_loose_or_tight_tolerance_keeps_its_promises() {
+    let built = build(rough(40, 25));
+    let reference = zoo::solve(&built, 150).eigenvalues;
+    for tolerance in [1e-3, 1e-6, 1e-12] {
+        let basis = zoo::checked(&built, &EigenOptions { count: 150, tolerance, ..Default::default() });
+        assert!(zoo::distance(&reference, &basis.eigenvalues) < 1e-9);
+    }
+}
+
+#[test]
+fn slivers_cost_digits_and_nothing_else() {
+    // A vertex moved to 1e-3 .. 1e-9 of an edge: cotangents, and with them ‖A‖, of up to 1e9.
+    for height in [1e-3, 1e-6, 1e-9] {
+        let (mut vertices, triangles) = rough(30, 25);
+        let [a, b] = [vertices[300], vertices[301]];
+        vertices[332] = [0, 1, 2].map(|k| 0.5 * (a[k] + b[k]) + if k == 2 { height } else { 0.0 });
+        let built = build((vertices, triangles));
+        match eigenbasis(&built, &EigenOptions { count: 100, ..Default::default() }, &()) {
+            Ok(basis) => {
+                let c = &basis.certificate;
+                assert!(c.complete && c.residual_max <= c.residual_floor.max(1e-10), "{height}: {c:?}");
+            }
+            Err(error) => assert!(height < 1e-8, "{height}: {error}"),
+        }
+    }
+}
+
 /// Coordinates on a small lattice, so that points coincide and faces lose their area; a few are moved far off.
 fn point() -> impl Strategy<Value = [f64; 3]> {
     prop_oneof![

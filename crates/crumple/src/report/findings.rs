@@ -196,7 +196,7 @@ pub fn findings(
         cloud: Cloud {
             eigenvector: cloud,
             eigenvalue: loaded.basis.eigenvalues[cloud - 1],
-            label: format!("eigenvector {cloud}, the first that is not constant"),
+            label: "the first that is not constant".to_owned(),
         },
         inputs: manifest.inputs.clone(),
         runs,

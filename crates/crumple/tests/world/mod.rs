@@ -104,6 +104,13 @@ impl Model {
         self
     }
 
+    /// Every quad as two triangles, split from its first to its third node.
+    pub fn triangulated(mut self) -> Self {
+        let halves = |&([a, b, c, d], part): &([u32; 4], usize)| [([a, b, c, c], part), ([a, c, d, d], part)];
+        self.shells = self.shells.iter().flat_map(halves).collect();
+        self
+    }
+
     /// All nodes moved by a map of space.
     pub fn moved(mut self, map: impl Fn(Point) -> Point) -> Self {
         self.nodes.iter_mut().for_each(|node| *node = map(*node));

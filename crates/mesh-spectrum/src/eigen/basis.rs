@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use crate::eigen::component::{Component, Pairs};
 use crate::eigen::finish::Evidence;
+use crate::eigen::slice::ROUNDING;
 use crate::operator::Operator;
 
 /// The K lowest eigenpairs of L φ = λ M φ on a mesh of N vertices.
@@ -141,7 +142,7 @@ pub(crate) fn merge(
     Eigenbasis {
         certificate: Certificate {
             residual_max: evidence.iter().map(|evidence| evidence.residual).fold(0.0, f64::max) / scale,
-            residual_floor: 8.0 * 4e-16 * norm / scale,
+            residual_floor: ROUNDING * norm / scale,
             orthogonality: evidence.iter().map(|evidence| evidence.orthogonality).fold(0.0, f64::max),
             complete: counts.iter().all(|count| count.below_expected == count.below_counted),
             counts,

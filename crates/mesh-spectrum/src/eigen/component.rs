@@ -16,7 +16,7 @@ use crate::operator::{Csr, Operator};
 /// Pairs on either side of a shift. Fewer: more factorisations; more: larger spaces. Between 25 and 40 the time is flat.
 const PAIRS_A_SIDE: usize = 28;
 
-/// Up to this size the dense solver takes no longer than a slice.
+/// Up to this size the dense solver is used: a slice solves a projected problem of 250 to 300 itself.
 pub(crate) const DENSE_BELOW: usize = 400;
 
 /// Where more than this share of all pairs is wanted, the dense solver finds all. The upper end of the spectrum is no
