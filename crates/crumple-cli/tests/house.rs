@@ -27,6 +27,7 @@ const STAGES: &[&str] = &[
     "inputs",
     "reference",
     "basis",
+    "select",
     "rotation",
     "project",
     "study",

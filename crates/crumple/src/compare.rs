@@ -80,7 +80,7 @@ pub struct ModesAgreement {
 /// # Errors
 /// [`Error::NoMatch`] for labels that fit no run, [`Error::NoModes`] without labels and modes, reading errors.
 pub fn compare(loaded: &Loaded, labels: Option<&Table>, threshold: Threshold) -> Result<Comparison, Error> {
-    let rows = loaded.last_states()?;
+    let rows = &*loaded.last_states()?;
     let (judges, notes) = match labels {
         Some(table) => Judge::of_labels(rows, loaded, table)?,
         None => (

@@ -5,18 +5,20 @@
 //!
 //! | stage | module | from | to |
 //! | --- | --- | --- | --- |
-//! | find and open result files | [`bundle`], [`run`] | paths | [`run::Run`] |
+//! | open result files, find and name them | [`run`], [`bundle`] | paths | [`run::Run`] |
 //! | input tables | [`inputs`] | CSV | a row a run |
 //! | the surface all runs share | [`reference`] | a run, parts | [`reference::Reference`] |
 //! | eigenbasis | [`basis`] | the reference | [`basis::Basis`] |
-//! | what is kept on disk | [`study`] | all of it | [`study::Study`] |
-//! | how each place has turned | [`rotation`] | a shape | rotation vectors |
+//! | how each place has turned | [`rotation`] | a shape | sin θ × axis |
 //! | coefficients of every state | [`project`] | a run | [`project::Projected`] |
+//! | what is kept on disk | [`study`] | all of it | [`study::Study`] |
+//! | a state that the user names | [`target`] | `run_007@3` | [`target::Target`] |
 //! | deformation modes | [`modes`] | coefficients | [`modes::Modes`] |
+//! | which coefficients are looked at | [`select`] | α or δ | values |
+//! | shape from coefficients | [`reconstruct`] | eigenvectors | errors in mm |
+//! | other methods on the same data | [`rivals`] | displacements | PCA |
 //! | the coefficients that matter | [`descriptor`] | one state | [`descriptor::Descriptor`] |
-//! | shape from coefficients | [`reconstruct`] | a descriptor | errors in mm |
 //! | how alike | [`similarity`] | a descriptor, coefficients | a ranking |
-//! | other methods on the same data | [`rivals`] | displacements | PCA, first M |
 //! | judged against labels | [`compare`] | labels | precision, average precision |
 //! | tables and arrays for others | [`export`] | a study | npy, CSV, Parquet |
 //! | one page for a person | [`report`] | a study | HTML |
@@ -38,6 +40,7 @@ pub mod report;
 pub mod rivals;
 pub mod rotation;
 pub mod run;
+pub mod select;
 pub mod similarity;
 pub mod study;
 pub mod target;

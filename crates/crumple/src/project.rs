@@ -4,12 +4,11 @@
 //! α = α⁰ + δ. Beside the coefficients: how much of the displacement they catch, how much of it is a rigid motion,
 //! and how far the surface is from isometric.
 
-use faer::linalg::matmul::matmul;
-use faer::{Accum, Mat, MatRef, Par};
+use faer::Mat;
 use mesh_spectrum::Watch;
 
 use crate::Error;
-use crate::basis::Basis;
+use crate::basis::{Basis, coefficients_of};
 use crate::reference::Reference;
 use crate::rotation;
 use crate::run::Run;
@@ -34,7 +33,7 @@ pub struct ProjectedState {
     pub time: f64,
     /// δ, K × 3, row-major, in length²; f32 as a study stores it.
     pub delta: Vec<f32>,
-    /// ρ = Φᵀ M r of the rotation field r, K × 3, row-major, in radians × length; f32.
+    /// ρ = Φᵀ M r of the rotation field r, K × 3, row-major, in length; f32.
     pub rotation: Vec<f32>,
     /// What else is known about the state.
     pub measures: Measures,
@@ -69,8 +68,6 @@ pub struct Measures {
 
 /// States are projected in batches of at most this many bytes of shapes, displacements and rotations.
 const BATCH_BYTES: usize = 64 << 20;
-/// Vertices a block: the block of Φ in f64 (K × 512 × 8 = 2 MB at K = 500) stays in the second-level cache.
-const BLOCK: usize = 512;
 
 /// Projects every whole state of a run. Memory is bounded whatever the number of states.
 ///
@@ -130,55 +127,6 @@ pub fn project(run: &Run, reference: &Reference, basis: &Basis, watch: &dyn Watc
         warnings.extend(last.measures.warnings());
     }
     Ok(Projected { run: run.id().to_owned(), states, content: hash.finalize().to_hex().to_string(), warnings })
-}
-
-/// Spectral coefficients Φᵀ M f of one vector function on the vertices (a shape, a displacement).
-///
-/// `values`: N × 3. Result: K × 3, in length² when the values are lengths.
-pub fn coefficients(basis: &Basis, values: &[[f64; 3]]) -> Vec<[f64; 3]> {
-    coefficients_of(basis, std::slice::from_ref(&values)).pop().unwrap_or_default()
-}
-
-/// Φᵀ M f of several functions at once: the block of Φ that is being widened to f64 serves all of them.
-fn coefficients_of<F: AsRef<[[f64; 3]]>>(basis: &Basis, functions: &[F]) -> Vec<Vec<[f64; 3]>> {
-    let (k, n, columns) = (basis.eigenpairs(), basis.vertices(), 3 * functions.len());
-    let mut result = Mat::<f64>::zeros(columns, k);
-    let mut weighted = vec![0.0; BLOCK * columns];
-    let mut widened = vec![0.0; BLOCK * k];
-    for first in (0..n).step_by(BLOCK) {
-        let rows = BLOCK.min(n - first);
-        for (function, values) in functions.iter().enumerate() {
-            for (row, point) in values.as_ref()[first..first + rows].iter().enumerate() {
-                for (component, x) in point.iter().enumerate() {
-                    weighted[row * columns + 3 * function + component] = x * basis.mass[first + row];
-                }
-            }
-        }
-        for (column, eigenvector) in widened.chunks_exact_mut(BLOCK).zip(basis.eigenvectors.chunks_exact(n)) {
-            column.iter_mut().zip(&eigenvector[first..first + rows]).for_each(|(wide, &x)| *wide = f64::from(x));
-        }
-        let weighted = MatRef::from_column_major_slice(&weighted[..rows * columns], columns, rows);
-        let widened = MatRef::from_column_major_slice(&widened, BLOCK, k).subrows(0, rows);
-        matmul(result.as_mut(), Accum::Add, weighted, widened, 1.0, Par::Seq);
-    }
-    let entry = |function: usize, k: usize, c: usize| result[(3 * function + c, k)];
-    (0..functions.len())
-        .map(|function| (0..k).map(|k| std::array::from_fn(|c| entry(function, k, c))).collect())
-        .collect()
-}
-
-/// Σ_j Φ_j c_j: the function on the vertices that has the coefficients `values` on `eigenvectors` (counted from 1)
-/// and none elsewhere. Result: N × 3.
-pub fn synthesize(basis: &Basis, eigenvectors: &[usize], values: &[[f64; 3]]) -> Vec<[f64; 3]> {
-    let mut result = vec![[0.0; 3]; basis.vertices()];
-    for (&eigenvector, value) in eigenvectors.iter().zip(values) {
-        for (point, &phi) in result.iter_mut().zip(basis.eigenvector(eigenvector)) {
-            for c in 0..3 {
-                point[c] += f64::from(phi) * value[c];
-            }
-        }
-    }
-    result
 }
 
 impl Measures {

@@ -7,10 +7,9 @@ use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
 
-use crate::basis::Basis;
-use crate::descriptor::Select;
-use crate::project::synthesize;
+use crate::basis::{Basis, synthesize};
 use crate::reference::Reference;
+use crate::select::Select;
 
 /// How far a reconstruction is from the original.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -8,7 +8,7 @@
 
 use faer::{Mat, Side};
 
-use crate::project::synthesize;
+use crate::basis::synthesize;
 use crate::reconstruct::displaced;
 use crate::study::{Coefficients, Loaded};
 

@@ -4,8 +4,9 @@
 use std::path::Path;
 
 use crate::Error;
+use crate::basis::coefficients;
 use crate::bundle;
-use crate::project::{coefficients, project};
+use crate::project::project;
 use crate::run::Run;
 use crate::study::{Loaded, Rows, Study};
 

@@ -5,8 +5,8 @@
 
 mod world;
 
-use crumple::basis::Basis;
-use crumple::project::{coefficients, project, synthesize};
+use crumple::basis::{Basis, coefficients, synthesize};
+use crumple::project::project;
 use crumple::reference::Reference;
 use crumple::study::Rows;
 use world::{Model, Point, World, bend, energy, noise, relative, rms, rotation, square_distance, triples};

@@ -2,9 +2,8 @@
 
 mod world;
 
-use crumple::basis::Basis;
+use crumple::basis::{Basis, coefficients, synthesize};
 use crumple::descriptor::{Descriptor, Select, Threshold};
-use crumple::project::{coefficients, synthesize};
 use crumple::similarity::{Comparer, Metric, SimilarityOptions, Weight, cosine, search};
 use crumple::study::{Loaded, Rows};
 use proptest::prelude::*;
@@ -25,7 +24,11 @@ fn options() -> Vec<SimilarityOptions> {
 fn deform(seed: f64) -> impl Fn(f64, Point) -> Point + Copy {
     move |t, p| {
         let [x, y, z] = bend(90.0, 0.3 * (seed - 2.0) * t)(p);
-        [x + t * (p[1] / (8.0 + seed)).cos(), y - 2.0 * t * (p[0] / 21.0 + seed).sin(), z + 3.0 * t * (p[0] / 12.0).sin()]
+        [
+            x + t * (p[1] / (8.0 + seed)).cos(),
+            y - 2.0 * t * (p[0] / 21.0 + seed).sin(),
+            z + 3.0 * t * (p[0] / 12.0).sin(),
+        ]
     }
 }
 
@@ -116,11 +119,12 @@ fn with_basis(loaded: &Loaded, basis: Basis, shapes: &[Vec<Point>]) -> (Basis, V
 
 #[test]
 fn another_basis_of_the_same_spaces_gives_the_same_similarities() {
-    // A square plate: λ of (1, 0) and (0, 1) is the same; the mesh of triangles along one diagonal keeps that symmetry.
+    // A tube: waves around it come as sine and cosine of one eigenvalue. In double precision, so that rounding of the
+    // positions does not part them.
     let world = World::new();
-    let model = Model::plate(6, 6, 60.0, 60.0);
+    let model = Model::tube(10, 4, 20.0, 60.0);
     for run in 0..4 {
-        world.write(&format!("run_{run}"), &model.family(2, deform(f64::from(run))));
+        world.write(&format!("run_{run}"), &model.family(2, deform(f64::from(run))).double());
     }
     let loaded = world.study(9);
     let clusters = loaded.basis.facts.clusters.clone();
@@ -143,10 +147,12 @@ fn another_basis_of_the_same_spaces_gives_the_same_similarities() {
     }
     let (here, deltas) = with_basis(&loaded, loaded.basis.clone(), &shapes);
     let (there, other_deltas) = with_basis(&loaded, other, &shapes);
-    let j = [2, first, last];
+    assert!(first > 1);
+    let j = [1, first, last];
     for select in [Select::Coordinates, Select::Difference] {
         let similarity = |basis: &Basis, deltas: &[Vec<Point>], run: usize| {
-            let on = |run: usize| -> Vec<f64> { j.iter().flat_map(|&j| select.value(basis, &deltas[run], j)).collect() };
+            let on =
+                |run: usize| -> Vec<f64> { j.iter().flat_map(|&j| select.value(basis, &deltas[run], j)).collect() };
             cosine(&on(0), &on(run))
         };
         for run in 0..4 {
@@ -174,7 +180,8 @@ fn mahalanobis_and_cosine_know_no_unit() {
         let world = World::new();
         for run in 0..6 {
             let family = Model::strip().family(2, deform(f64::from(run)));
-            let states = family.states.iter().map(|(t, nodes)| (*t, nodes.iter().map(|p| p.map(|x| scale * x)).collect()));
+            let states =
+                family.states.iter().map(|(t, nodes)| (*t, nodes.iter().map(|p| p.map(|x| scale * x)).collect()));
             let family = Model::strip().moved(|p| p.map(|x| scale * x)).family_of(states);
             world.write(&format!("run_{run}"), &family);
         }

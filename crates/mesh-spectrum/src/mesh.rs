@@ -77,7 +77,8 @@ impl Mesh {
     /// `[a, b, c, c]` a triangle.
     ///
     /// A quadrilateral is split along the diagonal with the larger minimum angle of its two triangles; along a–c
-    /// when both are alike to 1e-9 rad (so that rounding does not decide on rectangles). A face that repeats one of
+    /// when both are alike to 1e-4 rad (so that rounding does not decide on rectangles: single-precision
+    /// coordinates leave about 1e-6). A face that repeats one of
     /// its vertices is a triangle; one with fewer than three different vertices is left out and counted
     /// ([`faces_left_out`](Mesh::faces_left_out)).
     ///
@@ -152,6 +153,9 @@ fn check<const CORNERS: usize>(vertices: &[Point], faces: &[[u32; CORNERS]]) -> 
     Ok(())
 }
 
+/// Minimum angles closer than this, in radians, count as equal.
+const ALIKE: f64 = 1e-4;
+
 /// The two triangles of a quadrilateral, split along the diagonal with the larger minimum angle.
 fn split(vertices: &[Point], [a, b, c, d]: [u32; 4]) -> [[u32; 3]; 2] {
     let smallest = |halves: [[u32; 3]; 2]| {
@@ -160,7 +164,7 @@ fn split(vertices: &[Point], [a, b, c, d]: [u32; 4]) -> [[u32; 3]; 2] {
     };
     let along_ac = [[a, b, c], [a, c, d]];
     let along_bd = [[a, b, d], [b, c, d]];
-    if smallest(along_bd) > smallest(along_ac) + 1e-9 { along_bd } else { along_ac }
+    if smallest(along_bd) > smallest(along_ac) + ALIKE { along_bd } else { along_ac }
 }
 
 /// The smallest angle of a triangle, in radians; 0 where an edge has no length.

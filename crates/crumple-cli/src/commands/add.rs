@@ -15,7 +15,7 @@ use crate::output::Output;
 
 #[derive(Args)]
 #[command(
-    after_help = "Safe to repeat, to interrupt, and to run several at once on one study.\n\nExample, in the repository:\n  crumple add study examples/hat-section/runs --params examples/hat-section/inputs.csv"
+    after_help = "Safe to repeat, to interrupt, and to run several at once on one study.\n\nExample, in the repository:\n  crumple add study examples/hat-section/runs"
 )]
 pub(crate) struct Add {
     /// Folder of the study

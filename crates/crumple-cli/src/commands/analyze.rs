@@ -19,7 +19,7 @@ use crate::output::{Output, percent, table};
 
 #[derive(Args)]
 #[command(
-    after_help = "Repeating it on the same study adds what is new and finds modes, descriptors and report again.\n\nExample, in the repository:\n  crumple analyze examples/hat-section/runs --params examples/hat-section/inputs.csv --join 2.5 -o study"
+    after_help = "Repeating it on the same study adds what is new and finds modes, descriptors and report again.\n\nExample, in the repository:\n  crumple analyze examples/hat-section/runs --join 2.5 -o study"
 )]
 pub(crate) struct Analyze {
     /// Root files, run folders, or folders with runs below them
@@ -47,6 +47,10 @@ impl Analyze {
         let table = self.add.table()?;
         let mut seconds = Stopwatch::start();
         let found = bundle::find(&self.runs)?;
+        if let Some(table) = &table {
+            // A table that fits no run is found out before the eigenbasis is computed.
+            table.join(&found.iter().map(|run| run.id.as_str()).collect::<Vec<_>>())?;
+        }
         let reference = self.reference_run(&found)?;
         seconds.lap("find");
         let mut study = self.open_or_create(&reference, watch)?;

@@ -14,7 +14,7 @@ use crate::output::{Output, percent, table, two};
 
 #[derive(Args)]
 #[command(
-    after_help = "A table of labels has the run in its first column and a column `label`; a column `clear` (true, false) says which runs may\nstand for their label. The query of a label is the medoid of its clear runs; runs of other labels count as wrong.\n\nExample:\n  crumple compare study --labels examples/hat-section/labels.csv"
+    after_help = "A table of labels has the run in its first column and a column `label`; a column `clear` (true, false) says which runs may stand for their label. The query of a label is the medoid of its clear runs; runs of other labels count as wrong.\n\nExample:\n  crumple compare study --labels examples/hat-section/labels.csv"
 )]
 pub(crate) struct Compare {
     /// Folder of the study

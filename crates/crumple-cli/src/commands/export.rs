@@ -14,7 +14,7 @@ use crate::output::Output;
 
 #[derive(Args)]
 #[command(
-    after_help = "Writes eigenvalues, eigenvectors, mass, baseline, vertices, triangles, node_ids and coefficients as .npy, and the tables\ncoefficients, runs and modes as CSV or Parquet.\n\nExample:\n  crumple export study -o exported --descriptor mode-1 --last"
+    after_help = "Writes eigenvalues, eigenvectors, mass, baseline, vertices, triangles, node_ids and coefficients as .npy, and the tables coefficients, runs and modes as CSV or Parquet.\n\nExample:\n  crumple export study -o exported --descriptor mode-1 --last"
 )]
 pub(crate) struct Export {
     /// Folder of the study

@@ -64,7 +64,11 @@ impl Reconstruct {
             return Ok((format!("descriptor '{name}'"), descriptor.eigenvectors.len(), shape));
         }
         if let Some(components) = self.pca {
-            let pca = Pca::of(loaded.last_states()?, components);
+            if components == 0 {
+                return Err(Error::Value { name: "--pca", value: "0".into(), expected: "1 or more".into() });
+            }
+            let rows = loaded.last_states()?;
+            let pca = Pca::of(&rows, components);
             return Ok(("principal components".into(), pca.components(), pca.shape(loaded, delta)));
         }
         let count = self.first.unwrap_or(basis.eigenpairs());

@@ -20,6 +20,7 @@ pub fn save(study: &Study, descriptor: &Descriptor) -> Result<PathBuf, Error> {
             expected: "a name that can be a file name".into(),
         });
     }
+    let _writing = study.writing()?;
     let folder = study.folder().join(DESCRIPTORS);
     std::fs::create_dir_all(&folder).map_err(io("make the folder", &folder))?;
     let path = folder.join(format!("{name}.json"));

@@ -14,43 +14,9 @@ use crate::Error;
 use crate::basis::Basis;
 use crate::reconstruct::{Errors, errors, reconstruct};
 use crate::rivals::Pca;
+pub use crate::select::Select;
 use crate::study::Loaded;
 use crate::target::{self, Named, Target};
-
-/// Which magnitudes are compared with t.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Select {
-    /// |α|: coefficients of the coordinates.
-    #[default]
-    Coordinates,
-    /// |δ|: difference to the undeformed baseline.
-    Difference,
-}
-
-impl Select {
-    /// The value of eigenvector j (counted from 1) that this choice looks at, given δ, K × 3.
-    pub fn value(self, basis: &Basis, delta: &[[f64; 3]], j: usize) -> [f64; 3] {
-        let (delta, baseline) = (delta[j - 1], basis.baseline[j - 1]);
-        match self {
-            Self::Coordinates => std::array::from_fn(|c| baseline[c] + delta[c]),
-            Self::Difference => delta,
-        }
-    }
-
-    /// All K values.
-    pub fn values(self, basis: &Basis, delta: &[[f64; 3]]) -> Vec<[f64; 3]> {
-        (1..=delta.len()).map(|j| self.value(basis, delta, j)).collect()
-    }
-
-    /// As a word.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Coordinates => "coordinates",
-            Self::Difference => "difference",
-        }
-    }
-}
 
 /// A descriptor, as it is stored.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -216,7 +182,8 @@ pub(crate) fn choose(
 }
 
 fn pca_rival(loaded: &Loaded, target: &Target, original: &[[f64; 3]], components: usize) -> Result<Rival, Error> {
-    let pca = Pca::of(loaded.last_states()?, components);
+    let rows = loaded.last_states()?;
+    let pca = Pca::of(&rows, components);
     let shape = pca.shape(loaded, &target.delta);
     Ok(Rival {
         method: PCA.into(),

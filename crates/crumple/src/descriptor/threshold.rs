@@ -43,18 +43,37 @@ impl Default for Threshold {
 }
 
 impl Threshold {
+    /// The rule, if its number makes sense.
+    fn checked(self) -> Result<Self, Error> {
+        let (number, sensible, expected) = match self {
+            Self::Std(c) => (c, true, ""),
+            Self::Mean(c) => (c, c > 0.0, "the number must be above zero"),
+            Self::Value(t) => (t, t >= 0.0, "the number must not be negative"),
+            Self::Top(m) => (m as f64, m >= 1, "the number must be a whole number from 1"),
+            Self::Energy(share) => (share, share > 0.0 && share <= 1.0, "the share must be above 0 and at most 1"),
+            Self::Error(length) => (length, length > 0.0, "the number must be above zero"),
+        };
+        let fail = |what: &str| Err(Error::Threshold { rule: self.to_string(), what: what.to_owned() });
+        match (number.is_finite(), sensible) {
+            (false, _) => fail("what follows the colon is not a number"),
+            (true, false) => fail(expected),
+            (true, true) => Ok(self),
+        }
+    }
+
     /// Applies the rule to the coefficients of one state, K × 3.
     ///
     /// `rms_without(order, m)` gives the RMS error of a reconstruction from the first m eigenvectors of `order`;
     /// it is asked only by [`Threshold::Error`].
     ///
     /// # Errors
-    /// [`Error::Threshold`] if nothing passes, or the wanted error cannot be reached with K eigenvectors.
+    /// [`Error::Threshold`] if the rule makes no sense, if nothing passes, or the wanted error cannot be reached with K eigenvectors.
     pub fn select(
         &self,
         values: &[[f64; 3]],
         rms_without: impl Fn(&[usize], usize) -> f64,
     ) -> Result<Selection, Error> {
+        self.checked()?;
         let largest: Vec<f64> =
             values.iter().map(|triple| triple.iter().fold(0.0, |most: f64, x| most.max(x.abs()))).collect();
         let fail = |what: String| Error::Threshold { rule: self.to_string(), what };
@@ -78,6 +97,9 @@ impl Threshold {
             eigenvectors.sort_unstable();
             Selection { eigenvectors, threshold: largest[order[m - 1] - 1] }
         };
+        if values.is_empty() {
+            return Err(fail("there are no coefficients".into()));
+        }
         match *self {
             Self::Std(c) => {
                 let variance = magnitudes().map(|x| (x - mean).powi(2)).sum::<f64>() / count;
@@ -152,25 +174,20 @@ impl FromStr for Threshold {
     fn from_str(text: &str) -> Result<Self, Error> {
         let fail = |what: &str| Error::Threshold { rule: text.to_owned(), what: what.to_owned() };
         let (rule, value) = text.split_once(':').ok_or_else(|| fail("expected RULE:NUMBER"))?;
-        let number: f64 = value
-            .trim()
-            .parse()
-            .ok()
-            .filter(|x: &f64| x.is_finite())
-            .ok_or_else(|| fail("what follows the colon is not a number"))?;
-        let positive = if number > 0.0 { Ok(number) } else { Err(fail("the number must be above zero")) };
-        match rule {
-            "std" => Ok(Self::Std(number)),
-            "mean" => positive.map(Self::Mean),
-            "value" if number >= 0.0 => Ok(Self::Value(number)),
-            "value" => Err(fail("the number must not be negative")),
-            "top" if number >= 1.0 && number.fract() == 0.0 => Ok(Self::Top(number as usize)),
-            "top" => Err(fail("the number must be a whole number from 1")),
-            "energy" if number > 0.0 && number <= 1.0 => Ok(Self::Energy(number)),
-            "energy" => Err(fail("the share must be above 0 and at most 1")),
-            "error" => positive.map(Self::Error),
-            _ => Err(fail("no such rule")),
-        }
+        let number: f64 = value.trim().parse().map_err(|_| fail("what follows the colon is not a number"))?;
+        let threshold = match rule {
+            "std" => Self::Std(number),
+            "mean" => Self::Mean(number),
+            "value" => Self::Value(number),
+            "top" if number < 1.0 || number.fract() != 0.0 => {
+                return Err(fail("the number must be a whole number from 1"));
+            }
+            "top" => Self::Top(number as usize),
+            "energy" => Self::Energy(number),
+            "error" => Self::Error(number),
+            _ => return Err(fail("no such rule")),
+        };
+        threshold.checked()
     }
 }
 

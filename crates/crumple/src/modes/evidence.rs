@@ -49,7 +49,8 @@ mod tests {
     #[test]
     fn the_index_does_not_depend_on_names_and_knows_chance() {
         assert_eq!(adjusted_rand_index(&[0, 0, 1, 1], &[5, 5, 2, 2]), 1.0);
-        assert_eq!(adjusted_rand_index(&[0, 0, 1, 1], &[0, 1, 0, 1]), -0.5);
+        // Rounding of a handful of operations on small numbers.
+        assert!((adjusted_rand_index(&[0, 0, 1, 1], &[0, 1, 0, 1]) + 0.5).abs() < 1e-15);
         // Hubert and Arabie's formula by hand: 2 pairs together, expected 4·4/15, most 4.
         let value = adjusted_rand_index(&[0, 0, 0, 1, 1, 2], &[0, 0, 1, 1, 1, 1]);
         let (together, a, b, all) = (2.0, 4.0, 7.0, 15.0);

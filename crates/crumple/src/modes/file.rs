@@ -25,6 +25,7 @@ pub fn save(study: &Study, modes: &Modes) -> Result<(), Error> {
         ("outlier".to_owned(), Column::Flag(modes.runs.iter().map(|run| run.outlier).collect())),
     ];
     let whole = serde_json::to_string(modes).map_err(|error| Error::Internal(error.to_string()))?;
+    let _writing = study.writing()?;
     write_columns(&study.folder().join(FILE), &columns, Some((KEY, whole)))
 }
 

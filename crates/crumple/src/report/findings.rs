@@ -11,9 +11,9 @@ use serde::Serialize;
 use super::picture::{View, picture};
 use super::thin::Thin;
 use crate::Error;
+use crate::basis::synthesize;
 use crate::descriptor::{self, DescribeOptions, Described, FIRST_M, Rival, Threshold, describe};
 use crate::modes::{By, Mode, Modes, Tried};
-use crate::project::synthesize;
 use crate::reconstruct::{Errors, displaced};
 use crate::similarity::{Comparer, SimilarityOptions};
 use crate::study::{Loaded, Rows, RunRecord};
@@ -442,7 +442,8 @@ fn shapes(
         wanted.push((format!("{}:first_m", mode.name), thin.shape(&described.first_m)));
     }
     let room = (SHAPE_BYTES / (6 * thin.vertices.len())).saturating_sub(wanted.len());
-    let runs = &loaded.last_states()?.runs;
+    let rows = loaded.last_states()?;
+    let runs = &rows.runs;
     let others: Vec<usize> =
         (0..runs.len()).filter(|&row| modes.modes.iter().all(|mode| mode.medoid != runs[row])).take(room).collect();
     let read = |row: usize| Ok((format!("run:{}", runs[row]), thin.shape(&last_shape(loaded, row)?)));

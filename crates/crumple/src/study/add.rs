@@ -57,11 +57,12 @@ impl Study {
     /// [`Error::NoMatch`] for a table that fits no run, [`Error::Stopped`], [`Error::Io`].
     pub fn add(&mut self, found: &[Found], options: AddOptions<'_>, watch: &dyn Watch) -> Result<Added, Error> {
         self.clear_litter()?;
-        let writers = Lock::shared(&self.folder.join(coefficients::FOLDER).join(WRITERS))?;
+        let writers = self.writing()?;
         let outcome = self.project_and_commit(found, options, watch);
         drop(writers);
-        // Parts that the commit did not take up: a refused run, or one that was here already.
-        self.clear_litter()?;
+        // Parts that the commit did not take up: a refused run, or one that was here already. What cannot be cleared
+        // now, the next add clears.
+        let _ = self.clear_litter();
         outcome
     }
 
@@ -135,14 +136,13 @@ impl Study {
         Err(Error::RunChanged { run: states.run })
     }
 
-    /// Removes parts that no manifest names, if no writer is alive that could own them.
+    /// Removes what a killed writer left, if no writer is alive that could own it.
     fn clear_litter(&mut self) -> Result<(), Error> {
         let path = self.folder.join(coefficients::FOLDER).join(WRITERS);
         if let Some(_alone) = Lock::try_exclusive(&path)? {
             self.refresh()?;
             for part in coefficients::litter(&self.folder, &self.manifest)? {
-                let path = self.folder.join(part);
-                std::fs::remove_file(&path).map_err(crate::error::io("remove", &path))?;
+                std::fs::remove_file(&part).map_err(crate::error::io("remove", &part))?;
             }
         }
         Ok(())
@@ -249,6 +249,9 @@ struct Written {
     stopped: bool,
 }
 
+/// A projected run, and the stamp that its files had before they were read.
+type Stamped = (String, Projected);
+
 /// What every projection of an add shares.
 struct Work<'a> {
     reference: Reference,
@@ -259,12 +262,12 @@ struct Work<'a> {
 }
 
 impl Work<'_> {
-    fn project_all<'f>(&self, batch: &[&'f Found]) -> Vec<(&'f Found, Result<(String, Projected), Error>)> {
+    fn project_all<'f>(&self, batch: &[&'f Found]) -> Vec<(&'f Found, Result<Stamped, Error>)> {
         batch.par_iter().map(|&run| (run, self.project_one(run))).collect()
     }
 
-    /// The stamp of the files, taken before they are read: a run that grows meanwhile is looked at again next time.
-    fn project_one(&self, run: &Found) -> Result<(String, Projected), Error> {
+    /// The stamp is taken before the files are read: a run that grows meanwhile is looked at again next time.
+    fn project_one(&self, run: &Found) -> Result<Stamped, Error> {
         if self.watch.stopped() {
             return Err(Error::Stopped);
         }

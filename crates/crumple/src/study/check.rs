@@ -50,7 +50,10 @@ pub fn check(folder: &Path) -> Result<Checkup, Error> {
         problems.extend(contradictions(folder, &manifest));
     }
     let litter = coefficients::litter(folder, &manifest).unwrap_or_default();
-    notes.extend(litter.iter().map(|name| format!("{name}: no manifest names it; the next add clears it")));
+    notes.extend(litter.iter().map(|path| {
+        let name = path.strip_prefix(folder).unwrap_or(path).display();
+        format!("{name}: left by a process that was stopped; the next add clears it")
+    }));
     match tables::read_strings(&folder.join("runs.parquet"), "run") {
         Ok(runs) if runs.iter().eq(manifest.runs.keys()) => {}
         Ok(_) => notes.push("runs.parquet is behind the manifest; the next add renews it".into()),

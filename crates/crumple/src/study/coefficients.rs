@@ -3,7 +3,7 @@
 //! `run`, `state`, `time`, six measures, then `d1_x`, `d1_y`, `d1_z`, `d2_x`, …: δ of eigenvector j (counted from 1),
 //! and `r1_x`, …: ρ of the rotation field; all in f32. A part is never changed; its name is the hash of its content.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use arrow_array::cast::AsArray;
@@ -22,6 +22,8 @@ use crate::project::Projected;
 
 /// Folder of the parts in a study.
 pub(crate) const FOLDER: &str = "coefficients";
+/// What a part is called before its content has given it a name.
+const PART: &str = "part";
 const COMPONENTS: [char; 3] = ['x', 'y', 'z'];
 const MEASURES: [&str; 6] = ["rms", "max", "captured", "rigid_share", "strain_median", "strain_p95"];
 
@@ -31,7 +33,7 @@ pub enum Function {
     /// p − p⁰: coefficients δ, in length².
     #[default]
     Displacement,
-    /// The rotation field: coefficients ρ, in radians × length.
+    /// The rotation field: coefficients ρ, in length.
     Rotation,
 }
 
@@ -81,7 +83,7 @@ impl Coefficients {
 
 /// Writes runs as one part into the study's folder; returns its path below the study.
 pub(crate) fn write_part(folder: &Path, basis: &str, runs: &[Projected]) -> Result<String, Error> {
-    let staged = store::Staged::beside(&folder.join(FOLDER).join("part"));
+    let staged = store::Staged::beside(&folder.join(FOLDER).join(PART));
     let batch = record_batch(runs)?;
     let internal = |error: parquet::errors::ParquetError| match error {
         parquet::errors::ParquetError::External(source) => match source.downcast::<std::io::Error>() {
@@ -207,17 +209,19 @@ pub(crate) fn read_part<R: ChunkReader + 'static>(
     Ok(())
 }
 
-/// Files in the folder of the parts that no manifest names, by their path below the study.
-pub(crate) fn litter(folder: &Path, manifest: &Manifest) -> Result<Vec<String>, Error> {
+/// What a killed writer leaves behind: parts that no manifest names, and temporary files.
+pub(crate) fn litter(folder: &Path, manifest: &Manifest) -> Result<Vec<PathBuf>, Error> {
+    let tables = ["manifest.json", "runs.parquet", "modes.parquet"];
+    let mut paths: Vec<PathBuf> = tables.iter().flat_map(|name| store::temporaries(folder, name)).collect();
+    paths.extend(store::temporaries(&folder.join(super::DESCRIPTORS), ""));
     let parts = folder.join(FOLDER);
-    let mut names = Vec::new();
     for entry in std::fs::read_dir(&parts).map_err(io("read the folder", &parts))? {
         let entry = entry.map_err(io("read the folder", &parts))?;
         let name = format!("{FOLDER}/{}", entry.file_name().to_string_lossy());
         if entry.file_name() != super::WRITERS && entry.path().is_file() && !manifest.files.contains_key(&name) {
-            names.push(name);
+            paths.push(entry.path());
         }
     }
-    names.sort();
-    Ok(names)
+    paths.sort();
+    Ok(paths)
 }

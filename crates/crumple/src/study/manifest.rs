@@ -96,6 +96,9 @@ impl Manifest {
             {
                 return Err(Error::NotAStudy { folder: folder.to_owned(), what: format!("it has no {FILE}") });
             }
+            Err(error) if error.kind() == std::io::ErrorKind::InvalidData => {
+                return Err(Error::Damaged { path, what: "not a manifest: it is no text".into() });
+            }
             other => other.map_err(io("read", &path))?,
         };
         let damaged =

@@ -26,7 +26,7 @@ pub(crate) mod store;
 mod tables;
 
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use mesh_spectrum::Watch;
 use serde::{Deserialize, Serialize};
@@ -86,7 +86,14 @@ pub struct Loaded {
     pub reference: Reference,
     /// Its eigenbasis.
     pub basis: Basis,
-    last_states: OnceLock<Coefficients>,
+    last_states: Mutex<Option<Kept>>,
+}
+
+/// Last states, and the runs and parts they were read from, so that a study that has changed since is read again.
+#[derive(Debug)]
+struct Kept {
+    of: Vec<(String, String)>,
+    rows: Arc<Coefficients>,
 }
 
 impl Loaded {
@@ -113,7 +120,7 @@ impl Loaded {
             );
             return Err(Error::Damaged { path: study.folder.join(basis_file::FILE), what });
         }
-        Ok(Self { study, reference, basis, last_states: OnceLock::new() })
+        Ok(Self { study, reference, basis, last_states: Mutex::default() })
     }
 }
 
@@ -122,12 +129,15 @@ impl Loaded {
     ///
     /// # Errors
     /// As [`Study::coefficients`].
-    pub fn last_states(&self) -> Result<&Coefficients, Error> {
-        if let Some(rows) = self.last_states.get() {
-            return Ok(rows);
+    pub fn last_states(&self) -> Result<Arc<Coefficients>, Error> {
+        let now: Vec<_> = self.study.manifest.runs.iter().map(|(id, run)| (id.clone(), run.part.clone())).collect();
+        let mut kept = self.last_states.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(kept) = kept.as_ref().filter(|kept| kept.of == now) {
+            return Ok(Arc::clone(&kept.rows));
         }
-        let rows = self.study.coefficients(None, Rows::Last)?;
-        Ok(self.last_states.get_or_init(|| rows))
+        let rows = Arc::new(self.study.coefficients(None, Rows::Last)?);
+        *kept = Some(Kept { of: now, rows: Arc::clone(&rows) });
+        Ok(rows)
     }
 }
 
@@ -143,7 +153,7 @@ pub enum Rows<'a> {
 }
 
 /// An opened study.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Study {
     folder: PathBuf,
     settings: Settings,
@@ -171,9 +181,11 @@ impl Study {
             };
             return Err(Error::StudyExists { folder: folder.to_owned(), what: what.into() });
         }
-        let staged = StagedFolder::beside(folder)?;
+        // Can it be written at all? Better asked before the eigenbasis than after.
+        drop(StagedFolder::beside(folder)?);
         let reference = Reference::of_run(run, parts)?;
         let mut basis = Basis::compute(&reference, options, watch)?;
+        let staged = StagedFolder::beside(folder)?;
         let settings = Settings {
             reference: run.id().to_owned(),
             reference_path: absolute(run.path()),
@@ -319,10 +331,28 @@ impl Study {
                 })
             };
             let path = self.folder.join(part);
-            let file = std::fs::File::open(&path).map_err(io("read", &path))?;
+            let file = match std::fs::File::open(&path) {
+                Err(error) if error.kind() == std::io::ErrorKind::NotFound && self.is_behind()? => {
+                    // Another process has replaced runs since this study was opened, and cleared their old part.
+                    let mut now = self.clone();
+                    now.refresh()?;
+                    return now.coefficients_of(function, Some(eigenvectors), rows);
+                }
+                other => other.map_err(io("read", &path))?,
+            };
             coefficients::read_part(file, &path, &keep, &mut result)?;
         }
         Ok(result.sorted())
+    }
+
+    /// Held by whoever writes into the study: as long as somebody does, nobody clears what looks like litter.
+    pub(crate) fn writing(&self) -> Result<store::Lock, Error> {
+        store::Lock::shared(&self.folder.join(coefficients::FOLDER).join(WRITERS))
+    }
+
+    /// Whether the manifest on disk is another one than this study was opened with.
+    fn is_behind(&self) -> Result<bool, Error> {
+        Ok(Manifest::read(&self.folder)? != self.manifest)
     }
 
     /// The record of a run of the study.
@@ -361,23 +391,29 @@ fn is_empty_folder(path: &Path) -> bool {
 /// A folder that is being filled under a temporary name, removed unless it was renamed.
 struct StagedFolder {
     path: PathBuf,
+    /// Held as long as the folder is being filled: tells the folder of a killed process from that of a live one.
+    _lock: store::Lock,
 }
 
 impl StagedFolder {
     fn beside(folder: &Path) -> Result<Self, Error> {
         let parent = folder.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
         std::fs::create_dir_all(parent).map_err(io("make the folder", parent))?;
-        let path = store::Staged::beside(folder);
-        std::fs::create_dir(&path.path).map_err(io("make the folder", folder))?;
-        let staged = Self { path: path.path.clone() };
-        std::mem::forget(path);
-        Ok(staged)
+        for path in store::temporaries(parent, &folder.file_name().unwrap_or_default().to_string_lossy()) {
+            if path.is_dir() && matches!(store::Lock::try_exclusive(&path.join(LOCK)), Ok(Some(_))) {
+                // Left by a killed process; if it cannot be removed it is in nobody's way.
+                let _ = std::fs::remove_dir_all(&path);
+            }
+        }
+        let path = store::temporary_name(folder);
+        std::fs::create_dir(&path).map_err(io("make the folder", folder))?;
+        let lock = store::Lock::exclusive(&path.join(LOCK))?;
+        Ok(Self { path, _lock: lock })
     }
 
     fn rename_to(self, folder: &Path) -> Result<(), Error> {
-        std::fs::rename(&self.path, folder).map_err(io("write", folder))?;
-        std::mem::forget(self);
-        Ok(())
+        // What is renamed is no longer at the old path, and nothing is there for `drop` to remove.
+        std::fs::rename(&self.path, folder).map_err(io("write", folder))
     }
 }
 

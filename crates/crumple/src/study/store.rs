@@ -41,6 +41,29 @@ pub(crate) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     write_whole(path, |writer| writer.write_all(bytes).map_err(io("write", path)))
 }
 
+/// Marks temporary names: `.NAME.tmp-RANDOM`.
+const MARK: &str = ".tmp-";
+
+/// A name beside `path` for something that is not whole yet.
+pub(crate) fn temporary_name(path: &Path) -> PathBuf {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    // Random, not the process id: writers on several hosts may share it.
+    let nonce = RandomState::new().build_hasher().finish();
+    path.with_file_name(format!(".{name}{MARK}{nonce:016x}"))
+}
+
+/// What stands in `folder` under a temporary name for `name`, or for any name where it is empty.
+pub(crate) fn temporaries(folder: &Path, name: &str) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let temporary = |entry: &std::fs::DirEntry| {
+        let entry = entry.file_name().to_string_lossy().into_owned();
+        let stands_for =
+            entry.strip_prefix('.').and_then(|rest| rest.rsplit_once(MARK)).map(|(stands_for, _)| stands_for);
+        stands_for.is_some_and(|stands_for| name.is_empty() || stands_for == name)
+    };
+    entries.filter(temporary).map(|entry| entry.path()).collect()
+}
+
 /// A temporary file that is removed unless it was renamed.
 pub(crate) struct Staged {
     /// Where it is.
@@ -49,10 +72,7 @@ pub(crate) struct Staged {
 
 impl Staged {
     pub(crate) fn beside(path: &Path) -> Self {
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        // Random, not the process id: writers on several hosts may share it.
-        let nonce = RandomState::new().build_hasher().finish();
-        Self { path: path.with_file_name(format!(".{name}.tmp-{nonce:016x}")) }
+        Self { path: temporary_name(path) }
     }
 
     /// Makes the file; `path`, the one it stands for, is named in the error.

@@ -16,7 +16,7 @@ pub struct Eigenbasis {
     /// with extreme slivers another one below [`Certificate::residual_floor`] may come out as 0.)
     pub eigenvalues: Vec<f64>,
     /// K × N, row-major: one eigenvector after another, values on vertices, in 1/ℓ. With M = diag(`vertex_mass`),
-    /// Φᵀ M Φ = I. The entry of largest magnitude is positive; of entries within 1e-6 of it (on symmetric meshes several
+    /// Φᵀ M Φ = I. The entry of largest magnitude is positive; of entries within 1e-3 of it (on symmetric meshes several
     /// are equal but for rounding, which must not decide) the lowest vertex decides.
     pub eigenvectors: Vec<f64>,
     /// N.
@@ -165,10 +165,10 @@ pub(crate) fn merge(
     }
 }
 
-/// Makes the entry of largest magnitude positive; among those within 1e-6 of it, the first.
+/// Makes the entry of largest magnitude positive; among those within 1e-3 of it, the first.
 fn fix_sign(phi: &mut [f64]) {
     let most = phi.iter().fold(0.0f64, |most, x| most.max(x.abs()));
-    let decides = phi.iter().find(|x| x.abs() >= (1.0 - 1e-6) * most);
+    let decides = phi.iter().find(|x| x.abs() >= (1.0 - 1e-3) * most);
     if decides.is_some_and(|x| *x < 0.0) {
         phi.iter_mut().for_each(|x| *x = 0.0 - *x); // 0 stays 0, not −0
     }

@@ -4,10 +4,15 @@
 //! stores eigenvectors as f32, and everything is computed with the rounded ones, so that a run added later is
 //! projected on exactly the vectors of the first.
 
+mod transform;
+
 use std::ops::Range;
 
 use mesh_spectrum::{EigenOptions, OperatorOptions, Watch};
 use serde::{Deserialize, Serialize};
+
+pub(crate) use transform::coefficients_of;
+pub use transform::{coefficients, synthesize};
 
 use crate::Error;
 use crate::reference::Reference;
@@ -126,7 +131,7 @@ impl Basis {
             baseline: Vec::new(),
             facts,
         };
-        basis.baseline = crate::project::coefficients(&basis, reference.mesh.vertices());
+        basis.baseline = coefficients(&basis, reference.mesh.vertices());
         Ok(basis)
     }
 
