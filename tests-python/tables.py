@@ -26,7 +26,7 @@ def read_table(path: Path) -> pd.DataFrame:
     in every numeric column (compared as f64, missing values in the same places).
     """
     parquet = path.suffix == ".parquet"
-    frame = pd.read_parquet(path) if parquet else pd.read_csv(path)
+    frame = pd.read_parquet(path) if parquet else pd.read_csv(path, float_precision="round_trip")
     other = pl.read_parquet(path) if parquet else pl.read_csv(path, infer_schema_length=None)
     reader = "read_parquet" if parquet else "read_csv"
     with duckdb.connect() as connection:

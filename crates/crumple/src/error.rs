@@ -135,7 +135,7 @@ pub enum Error {
     #[error("eigenbasis: {0}")]
     Eigen(mesh_spectrum::EigenError),
     /// The caller asked to stop.
-    #[error("interrupted; what was finished is kept")]
+    #[error("interrupted")]
     Stopped,
     /// A folder that is no study.
     #[error("{}: not a study: {what}", folder.display())]
@@ -244,6 +244,14 @@ pub enum Error {
         /// The study's basis.
         expected: String,
     },
+    /// A descriptor file that cannot be used.
+    #[error("{}: not a usable descriptor: {what}", path.display())]
+    BadDescriptor {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        what: String,
+    },
     /// A rule for the threshold that cannot be understood or applied.
     #[error("threshold '{rule}': {what}")]
     Threshold {
@@ -345,7 +353,9 @@ impl Error {
             Self::TooFewRuns { .. } => "add more runs",
             Self::UnknownMode { .. } | Self::NoModes => "`crumple modes STUDY` finds and names them",
             Self::UnknownDescriptor { .. } => "`crumple describe STUDY RUN` makes one",
-            Self::OtherBasis { .. } => "make it again in this study with `crumple describe`",
+            Self::OtherBasis { .. } | Self::BadDescriptor { .. } => {
+                "make it again in this study with `crumple describe`"
+            }
             Self::Threshold { .. } => "rules: std:C  mean:C  value:T  top:M  energy:SHARE  error:MM",
             Self::Table { .. } => "a table is CSV with one header line and one row a run, the run in the first column",
             Self::NoMatch { .. } => "the first column must hold the runs' ids, or their numbers",

@@ -9,7 +9,7 @@ use crate::Error;
 use crate::descriptor::Descriptor;
 use crate::error::io;
 use crate::modes;
-use crate::study::{Coefficients, Column, Loaded, Rows, column_name, store, write_columns};
+use crate::study::{Coefficients, Column, Loaded, Rows, add_inputs, column_name, store, write_columns};
 
 /// Formats of tables.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -120,12 +120,7 @@ fn run_columns(loaded: &Loaded) -> Vec<(String, Column)> {
         ("rigid_share".to_owned(), number(&|run| Some(run.last.rigid_share))),
         ("strain_p95".to_owned(), number(&|run| Some(run.last.strain_p95))),
     ];
-    for name in &manifest.inputs {
-        columns.push((
-            name.clone(),
-            Column::of_texts(runs.iter().map(|run| run.inputs.get(name).map(String::as_str)).collect()),
-        ));
-    }
+    add_inputs(&mut columns, manifest);
     columns
 }
 

@@ -60,6 +60,11 @@ impl Table {
         if columns.is_empty() {
             return Err(fault(format!("only one column ('{key}'); expected the run and at least one value")));
         }
+        let mut names: Vec<&str> = header.iter().collect();
+        names.sort_unstable();
+        if let Some(twice) = names.windows(2).find(|pair| pair[0] == pair[1]) {
+            return Err(fault(format!("two columns are called '{}'", twice[0])));
+        }
         let mut rows = Vec::new();
         let mut line_of_key = HashMap::new();
         for record in reader.records() {
@@ -88,8 +93,11 @@ impl Table {
         let by_key: HashMap<&str, usize> =
             self.rows.iter().enumerate().map(|(row, (key, _))| (key.as_str(), row)).collect();
         let mut notes = Vec::new();
+        let mut names: HashMap<&str, usize> = HashMap::new();
+        runs.iter().for_each(|run| *names.entry(last_component(run)).or_default() += 1);
+        let by_name = |run: &str| by_key.get(last_component(run)).filter(|_| names[last_component(run)] == 1);
         let mut row_of_run: Vec<Option<usize>> =
-            runs.iter().map(|run| by_key.get(run).or_else(|| by_key.get(last_component(run))).copied()).collect();
+            runs.iter().map(|run| by_key.get(run).or_else(|| by_name(run)).copied()).collect();
         if row_of_run.iter().all(Option::is_none)
             && let Some(by_number) = self.rows_by_number(runs)
         {

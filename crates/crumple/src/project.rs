@@ -67,73 +67,94 @@ pub struct Measures {
 }
 
 /// States are projected in batches of at most this many bytes of shapes, displacements and rotations.
-const BATCH_BYTES: usize = 64 << 20;
+const BATCH_BYTES: usize = 256 << 20;
 
-/// Projects every whole state of a run. Memory is bounded whatever the number of states.
+/// Projects one run; for several, make a [`Projector`] once.
 ///
 /// # Errors
-/// [`Error::OtherMesh`], [`Error::NotFinite`], [`Error::NoStates`], [`Error::NoCoordinates`], [`Error::Stopped`] and
-/// reading errors.
+/// As [`Projector::project`].
 pub fn project(run: &Run, reference: &Reference, basis: &Basis, watch: &dyn Watch) -> Result<Projected, Error> {
-    let mut warnings = run.warnings();
-    if run.times().is_empty() {
-        let reason = if warnings.is_empty() { String::new() } else { format!(": {}", warnings.join("; ")) };
-        return Err(Error::NoStates { run: run.id().to_owned(), reason });
+    Projector::new(reference, basis).project(run, watch)
+}
+
+/// Projects runs on one basis.
+pub struct Projector<'a> {
+    reference: &'a Reference,
+    basis: &'a Basis,
+    geometry: Geometry<'a>,
+}
+
+impl<'a> Projector<'a> {
+    /// Prepares what all runs share.
+    pub fn new(reference: &'a Reference, basis: &'a Basis) -> Self {
+        Self { reference, basis, geometry: Geometry::of(reference, basis) }
     }
-    let placement = reference.place(run)?;
-    let geometry = Geometry::of(reference, basis);
-    if placement.offset_max > 1e-3 * geometry.edge_mean {
-        warnings.push(format!("undeformed positions differ from the reference run's by up to {:.3}; displacements count from the reference", placement.offset_max));
-    }
-    let batch = (BATCH_BYTES / (72 * basis.vertices())).clamp(1, 64);
-    let mut hash = blake3::Hasher::new();
-    let mut states = Vec::with_capacity(run.times().len());
-    for first in (0..run.times().len()).step_by(batch) {
-        if watch.stopped() {
-            return Err(Error::Stopped);
+
+    /// Projects every whole state of a run. Memory is bounded whatever the number of states.
+    ///
+    /// # Errors
+    /// [`Error::OtherMesh`], [`Error::NotFinite`], [`Error::TooLarge`], [`Error::NoStates`], [`Error::NoCoordinates`],
+    /// [`Error::Stopped`] and reading errors.
+    pub fn project(&self, run: &Run, watch: &dyn Watch) -> Result<Projected, Error> {
+        let Self { reference, basis, geometry } = self;
+        let mut warnings = run.warnings();
+        if run.times().is_empty() {
+            let reason = if warnings.is_empty() { String::new() } else { format!(": {}", warnings.join("; ")) };
+            return Err(Error::NoStates { run: run.id().to_owned(), reason });
         }
-        let last = (first + batch).min(run.times().len());
-        let mut shapes = Vec::with_capacity(last - first);
-        for state in first..last {
-            let shape = reference.shape(run, &placement, state)?;
-            hash.update(&run.times()[state].to_le_bytes());
-            shape.iter().flatten().for_each(|x| {
-                hash.update(&x.to_le_bytes());
-            });
-            shapes.push(shape);
+        let placement = reference.place(run)?;
+        if placement.offset_max > 1e-3 * geometry.edge_mean {
+            warnings.push(format!("undeformed positions differ from the reference run's by up to {:.3}; displacements count from the reference", placement.offset_max));
         }
-        let displacements: Vec<Vec<[f64; 3]>> = shapes.iter().map(|shape| geometry.displacement(shape)).collect();
-        let turned: Vec<Vec<[f64; 3]>> = shapes
-            .iter()
-            .map(|shape| rotation::field(reference.mesh.triangles(), reference.mesh.vertices(), shape))
-            .collect();
-        let deltas = coefficients_of(basis, &displacements);
-        let rotations = coefficients_of(basis, &turned);
-        let narrow = |values: &[[f64; 3]]| values.iter().flatten().map(|&x| x as f32).collect();
-        for (at, (delta, rotation)) in deltas.iter().zip(&rotations).enumerate() {
-            let projected = ProjectedState {
-                time: run.times()[first + at],
-                delta: narrow(delta),
-                rotation: narrow(rotation),
-                measures: geometry.measures(&shapes[at], &displacements[at], delta),
-            };
-            if !projected.is_finite() {
-                return Err(Error::TooLarge { run: run.id().to_owned(), state: first + at, time: projected.time });
+        let batch = (BATCH_BYTES / (72 * basis.vertices())).clamp(1, 64);
+        let mut hash = blake3::Hasher::new();
+        let mut states = Vec::with_capacity(run.times().len());
+        for first in (0..run.times().len()).step_by(batch) {
+            if watch.stopped() {
+                return Err(Error::Stopped);
             }
-            states.push(projected);
+            let last = (first + batch).min(run.times().len());
+            let mut shapes = Vec::with_capacity(last - first);
+            for state in first..last {
+                let shape = reference.shape(run, &placement, state)?;
+                hash.update(&run.times()[state].to_le_bytes());
+                let bytes: Vec<u8> = shape.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
+                hash.update(&bytes);
+                shapes.push(shape);
+            }
+            let displacements: Vec<Vec<[f64; 3]>> = shapes.iter().map(|shape| geometry.displacement(shape)).collect();
+            let turned: Vec<Vec<[f64; 3]>> = shapes
+                .iter()
+                .map(|shape| rotation::field(reference.mesh.triangles(), reference.mesh.vertices(), shape))
+                .collect();
+            let deltas = coefficients_of(basis, &displacements);
+            let rotations = coefficients_of(basis, &turned);
+            let narrow = |values: &[[f64; 3]]| values.iter().flatten().map(|&x| x as f32).collect();
+            for (at, (delta, rotation)) in deltas.iter().zip(&rotations).enumerate() {
+                let projected = ProjectedState {
+                    time: run.times()[first + at],
+                    delta: narrow(delta),
+                    rotation: narrow(rotation),
+                    measures: geometry.measures(&shapes[at], &displacements[at], delta),
+                };
+                if !projected.is_finite() {
+                    return Err(Error::TooLarge { run: run.id().to_owned(), state: first + at, time: projected.time });
+                }
+                states.push(projected);
+            }
         }
+        if let Some(last) = states.last() {
+            warnings.extend(last.measures.warnings());
+        }
+        Ok(Projected { run: run.id().to_owned(), states, content: hash.finalize().to_hex().to_string(), warnings })
     }
-    if let Some(last) = states.last() {
-        warnings.extend(last.measures.warnings());
-    }
-    Ok(Projected { run: run.id().to_owned(), states, content: hash.finalize().to_hex().to_string(), warnings })
 }
 
 impl Measures {
     /// In plain words, what the user should know before trusting the numbers of this state.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
-        if self.rms > 0.0 && self.rigid_share > 0.5 {
+        if self.rigid_share > 0.5 {
             warnings.push(format!(
                 "{:.0} % of the displacement is a rigid motion of the whole part; similarities then speak of where it went more than of how it deformed",
                 100.0 * self.rigid_share
@@ -149,11 +170,13 @@ impl Measures {
     }
 }
 
-/// Undeformed positions and edges, once a run.
+/// Undeformed positions and edges, once for all runs.
 struct Geometry<'a> {
     undeformed: &'a [[f64; 3]],
     mass: &'a [f64],
     area: f64,
+    /// Σ m |p⁰ − centre|²: the size of the part.
+    spread: f64,
     edges: Vec<(u32, u32, f64)>,
     edge_mean: f64,
 }
@@ -173,7 +196,17 @@ impl<'a> Geometry<'a> {
         let length = |a: u32, b: u32| distance(undeformed[a as usize], undeformed[b as usize]);
         let edges: Vec<_> = ends.into_iter().map(|(a, b)| (a, b, length(a, b))).filter(|edge| edge.2 > 0.0).collect();
         let edge_mean = edges.iter().map(|edge| edge.2).sum::<f64>() / edges.len().max(1) as f64;
-        Self { undeformed, mass: &basis.mass, area: basis.mass.iter().sum(), edges, edge_mean }
+        let (mass, area) = (&basis.mass[..], basis.mass.iter().sum());
+        let mut geometry = Self { undeformed, mass, area, spread: 0.0, edges, edge_mean };
+        let centre = geometry.centre(undeformed);
+        let square = |p: &[f64; 3]| (0..3).map(|c| (p[c] - centre[c]).powi(2)).sum::<f64>();
+        geometry.spread = undeformed.iter().zip(mass).map(|(p, m)| m * square(p)).sum();
+        geometry
+    }
+
+    /// Centre of mass of a shape.
+    fn centre(&self, shape: &[[f64; 3]]) -> [f64; 3] {
+        std::array::from_fn(|c| shape.iter().zip(self.mass).map(|(p, m)| m * p[c]).sum::<f64>() / self.area)
     }
 
     fn displacement(&self, shape: &[[f64; 3]]) -> Vec<[f64; 3]> {
@@ -198,7 +231,12 @@ impl<'a> Geometry<'a> {
             rms: (norm2 / self.area).sqrt(),
             max,
             captured: if norm2 > 0.0 { (caught / norm2).min(1.0) } else { 1.0 },
-            rigid_share: if norm2 > 0.0 { (1.0 - self.rigid_rest(shape) / norm2).clamp(0.0, 1.0) } else { 0.0 },
+            // Of a displacement that is tiny against the part the difference of two large sums says nothing.
+            rigid_share: if norm2 > 1e-12 * self.spread {
+                (1.0 - self.rigid_rest(shape) / norm2).clamp(0.0, 1.0)
+            } else {
+                0.0
+            },
             strain_median: quantile(0.5),
             strain_p95: quantile(0.95),
         }
@@ -207,10 +245,7 @@ impl<'a> Geometry<'a> {
     /// min over rigid motions of ‖p − (R p⁰ + t)‖²_M: Horn 1987, the rotation from the largest eigenvector of a 4 × 4
     /// matrix. With centred shapes the minimum is Σ m (|p|² + |p⁰|²) − 2 λ_max.
     fn rigid_rest(&self, shape: &[[f64; 3]]) -> f64 {
-        let centre = |points: &[[f64; 3]]| -> [f64; 3] {
-            std::array::from_fn(|c| points.iter().zip(self.mass).map(|(p, m)| m * p[c]).sum::<f64>() / self.area)
-        };
-        let (p0, q0) = (centre(self.undeformed), centre(shape));
+        let (p0, q0) = (self.centre(self.undeformed), self.centre(shape));
         let mut s = [[0.0; 3]; 3];
         let mut spread = 0.0;
         for ((p, q), m) in self.undeformed.iter().zip(shape).zip(self.mass) {

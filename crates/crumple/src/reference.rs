@@ -49,6 +49,8 @@ impl Reference {
             .filter(|(_, part)| chosen.get(*part as usize).copied().unwrap_or(parts.is_empty()))
             .map(|(face, _)| face)
             .collect();
+        // A face without area has no part in the operator, and a vertex that only such faces use would have no mass.
+        let faces: Vec<[u32; 4]> = faces.into_iter().filter(|face| has_area(run.undeformed(), face)).collect();
         if faces.is_empty() {
             return Err(Error::NoSurface { run: run.id().to_owned(), found: run.contents() });
         }
@@ -74,6 +76,9 @@ impl Reference {
     pub fn place(&self, run: &Run) -> Result<Placement, Error> {
         let other = |what: String| Error::OtherMesh { run: run.id().to_owned(), what };
         let node_of_id: HashMap<u64, u32> = run.node_ids().iter().zip(0..).map(|(&id, node)| (id, node)).collect();
+        if node_of_id.len() < run.node_ids().len() {
+            return Err(other("several of its nodes have the same id, so the mesh cannot be found in it".into()));
+        }
         let node_of_vertex: Vec<u32> = self
             .node_ids
             .iter()
@@ -168,6 +173,16 @@ fn choose_parts(run: &Run, all: &[crate::run::Part], asked: &[String]) -> Result
         }
     }
     Ok(chosen)
+}
+
+fn has_area(points: &[[f64; 3]], &[a, b, c, d]: &[u32; 4]) -> bool {
+    let area = |a: u32, b: u32, c: u32| {
+        let [p, q, r] = [a, b, c].map(|node| points[node as usize]);
+        let (u, v): ([f64; 3], [f64; 3]) = (std::array::from_fn(|i| q[i] - p[i]), std::array::from_fn(|i| r[i] - p[i]));
+        (u[1] * v[2] - u[2] * v[1]).abs() + (u[2] * v[0] - u[0] * v[2]).abs() + (u[0] * v[1] - u[1] * v[0]).abs()
+    };
+    // A coordinate that is not a number is left for the mesh to name.
+    !(area(a, b, c) == 0.0 && area(a, c, d) == 0.0)
 }
 
 /// New index of each node (`u32::MAX` for unused ones), and the used nodes in rising order.

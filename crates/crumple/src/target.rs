@@ -40,6 +40,15 @@ impl Target {
 }
 
 impl Named {
+    /// What the user means in a study: a run whose id is the whole text, @ and all, or `RUN@STATE`.
+    pub fn in_study(study: &Study, text: &str) -> Self {
+        if study.manifest().runs.contains_key(text) {
+            Self { run: text.to_owned(), state: None }
+        } else {
+            Self::parse(text)
+        }
+    }
+
     /// Reads `RUN` or `RUN@STATE`. A name with an @ that is followed by something else is a name.
     pub fn parse(text: &str) -> Self {
         let whole = || Self { run: text.to_owned(), state: None };

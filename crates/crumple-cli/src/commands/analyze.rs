@@ -71,8 +71,7 @@ impl Analyze {
             descriptors.push(described.descriptor);
         }
         seconds.lap("describe");
-        let path = self.output.join("report.html");
-        report::write(&loaded, &describe_options, &path, watch)?;
+        let path = crumple::report::save(&loaded.study, &report::make(&loaded, &describe_options, watch)?)?;
         seconds.lap("report");
         init::advise(&loaded.basis, output);
         add::tell(&loaded.study, &added, output);

@@ -40,7 +40,7 @@ impl Describe {
         let loaded = Loaded::open(&self.study)?;
         let named = match (&self.run, &self.mode) {
             (_, Some(mode)) => Named { run: modes::load(&loaded.study)?.mode(mode)?.medoid.clone(), state: None },
-            (run, None) => Named::parse(run.as_deref().unwrap_or_default()),
+            (run, None) => Named::in_study(&loaded.study, run.as_deref().unwrap_or_default()),
         };
         let name = self.name.as_deref().or(self.mode.as_deref());
         let described = descriptor::describe(&loaded, &named, self.mode.as_deref(), name, &options)?;

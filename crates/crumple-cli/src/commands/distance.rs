@@ -36,7 +36,7 @@ impl Distance {
         let loaded = Loaded::open(&self.study)?;
         let descriptor = descriptor::load(&loaded.study, &self.descriptor)?;
         let comparer = Comparer::new(&loaded, &descriptor, options)?;
-        let target = resolve(&loaded, &Named::parse(&self.run))?;
+        let target = resolve(&loaded, &Named::in_study(&loaded.study, &self.run))?;
         let score = comparer.score(&target.on(comparer.eigenvectors()));
         let facts = json!({ "descriptor": descriptor.name, "run": target.run, "state": target.state, "time": target.time, "distance": score.distance, "similarity": score.similarity });
         output.print(&facts, || score.distance.to_string());

@@ -42,7 +42,7 @@ pub(crate) struct Reconstruct {
 impl Reconstruct {
     pub(crate) fn run(&self, output: &Output) -> Result<Answer, Error> {
         let loaded = Loaded::open(&self.study)?;
-        let named = Named::parse(&self.run);
+        let named = Named::in_study(&loaded.study, &self.run);
         let target = resolve(&loaded, &named)?;
         let original = target::shape(&loaded, &named, &target)?;
         let (method, size, shape) = self.shape(&loaded, &target.delta)?;

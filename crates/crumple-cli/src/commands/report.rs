@@ -1,6 +1,6 @@
 //! `crumple report`: one page.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use crumple::descriptor::DescribeOptions;
@@ -32,7 +32,9 @@ impl Report {
     pub(crate) fn run(&self, output: &Output, watch: &dyn Watch) -> Result<Answer, Error> {
         let options = self.describe.options()?;
         let loaded = Loaded::open(&self.study)?;
-        let bytes = write(&loaded, &options, &self.output, watch)?;
+        let page = make(&loaded, &options, watch)?;
+        crumple::report::write(&self.output, &page)?;
+        let bytes = page.len();
         output.print(&json!({ "file": self.output, "bytes": bytes }), || {
             format!("{} ({:.1} MB)", self.output.display(), bytes as f64 / 1e6)
         });
@@ -40,13 +42,8 @@ impl Report {
     }
 }
 
-/// Writes the page; finds the modes first where the study has none. Returns its length in bytes.
-pub(crate) fn write(
-    loaded: &Loaded,
-    options: &DescribeOptions,
-    path: &Path,
-    watch: &dyn Watch,
-) -> Result<usize, Error> {
+/// The page; finds the modes first where the study has none.
+pub(crate) fn make(loaded: &Loaded, options: &DescribeOptions, watch: &dyn Watch) -> Result<String, Error> {
     let modes = match modes::load(&loaded.study) {
         Err(Error::NoModes) => {
             let found = modes::modes(&loaded.study, &ModesOptions::default(), watch)?;
@@ -55,7 +52,5 @@ pub(crate) fn write(
         }
         other => other?,
     };
-    let page = page(&findings(loaded, &modes, options, watch)?)?;
-    crumple::report::write(path, &page)?;
-    Ok(page.len())
+    page(&findings(loaded, &modes, options, watch)?)
 }

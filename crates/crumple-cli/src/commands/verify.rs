@@ -49,7 +49,7 @@ impl Verify {
         let descriptor = descriptor::load(&loaded.study, &self.descriptor)?;
         let comparer = Comparer::new(&loaded, &descriptor, options)?;
         let judge = |run: &String| {
-            let target = resolve(&loaded, &Named::parse(run))?;
+            let target = resolve(&loaded, &Named::in_study(&loaded.study, run))?;
             Ok((target.run.clone(), target.state, comparer.score(&target.on(comparer.eigenvectors())).similarity))
         };
         let judged: Vec<(String, usize, f64)> = self.runs.iter().map(judge).collect::<Result<_, Error>>()?;

@@ -32,7 +32,7 @@ pub fn save(study: &Study, descriptor: &Descriptor) -> Result<PathBuf, Error> {
 /// Loads a descriptor by its name in the study, or by the path of its file.
 ///
 /// # Errors
-/// [`Error::UnknownDescriptor`], [`Error::Damaged`], [`Error::OtherBasis`].
+/// [`Error::UnknownDescriptor`], [`Error::BadDescriptor`], [`Error::OtherBasis`].
 pub fn load(study: &Study, name: &str) -> Result<Descriptor, Error> {
     let inside = study.folder().join(DESCRIPTORS).join(format!("{name}.json"));
     let path = if inside.is_file() { inside } else { PathBuf::from(name) };
@@ -46,19 +46,24 @@ pub fn load(study: &Study, name: &str) -> Result<Descriptor, Error> {
 
 fn read(path: &Path, study: &Study) -> Result<Descriptor, Error> {
     let text = std::fs::read_to_string(path).map_err(io("read", path))?;
-    let damaged = |what: String| Error::Damaged { path: path.to_owned(), what };
-    let descriptor: Descriptor =
-        serde_json::from_str(&text).map_err(|error| damaged(format!("not a descriptor: {error}")))?;
+    let unusable = |what: String| Error::BadDescriptor { path: path.to_owned(), what };
+    let descriptor: Descriptor = serde_json::from_str(&text).map_err(|error| unusable(error.to_string()))?;
     let expected = &study.manifest().basis;
     if descriptor.basis != *expected {
         return Err(Error::OtherBasis { name: descriptor.name, found: descriptor.basis, expected: expected.clone() });
     }
-    let (j, values) = (&descriptor.eigenvectors, &descriptor.values);
-    let rising = j.windows(2).all(|pair| pair[0] < pair[1]);
-    let inside = j.first().is_some_and(|&j| j >= 1) && j.last().is_some_and(|&j| j <= study.manifest().eigenpairs);
-    let finite = values.as_flattened().iter().all(|x| x.is_finite());
-    if !rising || !inside || !finite || j.len() != values.len() {
-        return Err(damaged("its eigenvectors and values do not fit together or not the study".into()));
+    let (j, values, k) = (&descriptor.eigenvectors, &descriptor.values, study.manifest().eigenpairs);
+    if j.is_empty() || j.len() != values.len() {
+        return Err(unusable(format!("{} eigenvectors and {} values", j.len(), values.len())));
+    }
+    if let Some(outside) = j.iter().find(|j| !(1..=k).contains(*j)) {
+        return Err(unusable(format!("eigenvector {outside}; the study has 1 to {k}")));
+    }
+    if !j.windows(2).all(|pair| pair[0] < pair[1]) {
+        return Err(unusable("its eigenvectors do not rise".into()));
+    }
+    if !values.as_flattened().iter().all(|x| x.is_finite()) {
+        return Err(unusable("a value is not a number".into()));
     }
     Ok(descriptor)
 }

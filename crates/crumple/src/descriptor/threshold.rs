@@ -83,7 +83,9 @@ impl Threshold {
         let above = |t: f64| {
             let eigenvectors: Vec<usize> = (1..=values.len()).filter(|&j| largest[j - 1] > t).collect();
             let most = largest.iter().copied().fold(0.0, f64::max);
-            if eigenvectors.is_empty() {
+            if most == 0.0 {
+                Err(fail("all coefficients are zero: the state is the undeformed one".into()))
+            } else if eigenvectors.is_empty() {
                 Err(fail(format!("no coefficient is larger than t = {t:.6}; the largest is {most:.6}")))
             } else {
                 Ok(Selection { eigenvectors, threshold: t })

@@ -240,8 +240,8 @@ fn assemble(
 
 /// The member with the smallest mean distance to the others; ties by order, which is by run id.
 pub(crate) fn medoid(distances: &Distances, members: &[usize]) -> usize {
-    let total = |run: usize| members.iter().map(|&other| distances.between(run, other)).sum::<f64>();
-    members.iter().copied().min_by(|&a, &b| total(a).total_cmp(&total(b))).unwrap_or(0)
+    let total = |&run: &usize| (members.iter().map(|&other| distances.between(run, other)).sum::<f64>(), run);
+    members.iter().map(total).min_by(|a, b| a.0.total_cmp(&b.0)).map_or(0, |(_, run)| run)
 }
 
 fn outlier_limit(distances: &[f64]) -> Option<f64> {
@@ -312,7 +312,15 @@ impl Points {
     pub(crate) fn distances(&self) -> Distances {
         use rayon::prelude::*;
         let count = self.count();
-        let row = |a: usize| (0..count).map(move |b| square_distance(self.point(a), self.point(b)).sqrt() as f32);
+        let lengths: Vec<f64> = (0..count).map(|a| self.point(a).iter().map(|x| x * x).sum()).collect();
+        let lengths = &lengths;
+        let row = |a: usize| {
+            (0..count).map(move |b| {
+                let square = square_distance(self.point(a), self.point(b));
+                // Equal runs may differ by rounding, which is no distance.
+                if square > 1e-26 * (lengths[a] + lengths[b]) { square.sqrt() as f32 } else { 0.0 }
+            })
+        };
         Distances { count, values: (0..count).into_par_iter().flat_map_iter(row).collect() }
     }
 

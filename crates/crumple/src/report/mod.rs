@@ -9,4 +9,4 @@ pub mod picture;
 mod thin;
 
 pub use findings::{Findings, findings};
-pub use page::{page, write};
+pub use page::{page, save, write};

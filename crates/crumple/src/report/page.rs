@@ -1,12 +1,12 @@
 //! The page: a template, a style, scripts and the findings in one file that needs no network.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use minijinja::{Environment, context};
 
 use super::Findings;
 use crate::Error;
-use crate::study::store;
+use crate::study::{Study, store};
 
 const TEMPLATE: &str = include_str!("page/page.html");
 const STYLE: &str = include_str!("page/css/page.css");
@@ -41,6 +41,17 @@ pub fn page(findings: &Findings) -> Result<String, Error> {
         script => SCRIPTS.join("\n"),
     };
     template.render(values).map_err(|error| internal(error.to_string()))
+}
+
+/// Writes the page into its study, as `report.html`; returns its path.
+///
+/// # Errors
+/// [`Error::Io`].
+pub fn save(study: &Study, page: &str) -> Result<PathBuf, Error> {
+    let _writing = study.writing()?;
+    let path = study.folder().join("report.html");
+    write(&path, page)?;
+    Ok(path)
 }
 
 /// Writes the page to a file.

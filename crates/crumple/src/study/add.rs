@@ -7,11 +7,9 @@ use rayon::prelude::*;
 
 use super::store::Lock;
 use super::{Error, FileRecord, LOCK, Manifest, RunRecord, Study, WRITERS, absolute, coefficients, tables};
-use crate::basis::Basis;
 use crate::bundle::Found;
 use crate::inputs::Table;
-use crate::project::{Projected, project};
-use crate::reference::Reference;
+use crate::project::{Projected, Projector};
 use crate::run::Run;
 use mesh_spectrum::Watch;
 
@@ -78,9 +76,14 @@ impl Study {
         let (unchanged, todo): (Vec<_>, Vec<_>) = found.iter().zip(here).partition(|(_, here)| *here);
         result.unchanged = unchanged.iter().map(|(run, _)| run.id.clone()).collect();
         let todo: Vec<&Found> = todo.into_iter().map(|(run, _)| run).collect();
-        let (reference, basis) = (self.reference()?, self.basis()?);
-        let work = Work { reference, basis, total: todo.len(), done: Mutex::new(0), watch };
         let mut waiting = BTreeMap::new();
+        if todo.is_empty() {
+            self.commit(waiting, &inputs, options.replace, &mut result)?;
+            return Ok(result);
+        }
+        let (reference, basis) = (self.reference()?, self.basis()?);
+        let projector = Projector::new(&reference, &basis);
+        let work = Work { projector, total: todo.len(), done: Mutex::new(0), watch };
         for batch in todo.chunks(PART_RUNS) {
             let written = self.write_batch(&work, batch, &options)?;
             result.skipped.extend(written.failures);
@@ -254,8 +257,7 @@ type Stamped = (String, Projected);
 
 /// What every projection of an add shares.
 struct Work<'a> {
-    reference: Reference,
-    basis: Basis,
+    projector: Projector<'a>,
     total: usize,
     done: Mutex<usize>,
     watch: &'a dyn Watch,
@@ -274,7 +276,7 @@ impl Work<'_> {
         let projected = match &run.fault {
             Some(fault) => Err(Error::Refused { what: fault.what.clone(), remedy: fault.remedy.clone() }),
             None => Run::open(&run.id, &run.path)
-                .and_then(|opened| Ok((stamp(&opened), project(&opened, &self.reference, &self.basis, self.watch)?))),
+                .and_then(|opened| Ok((stamp(&opened), self.projector.project(&opened, self.watch)?))),
         };
         if let Ok(mut done) = self.done.lock() {
             *done += 1;

@@ -27,6 +27,13 @@ pub struct Checkup {
 pub fn check(folder: &Path) -> Result<Checkup, Error> {
     let mut problems = Vec::new();
     let mut notes = Vec::new();
+    // Is it a study at all? Asked before a lock file is made in it.
+    let before = Manifest::read(folder);
+    if let Err(Error::NotAStudy { .. } | Error::OtherLayout { .. }) = before {
+        before?;
+    }
+    // With the lock, no writer replaces the manifest meanwhile. A study that cannot be written is read without.
+    let _lock = Lock::exclusive(&folder.join(LOCK)).ok();
     let manifest = match Manifest::read(folder) {
         Err(Error::Damaged { path, what }) => {
             let problems = vec![format!("{}: {what}", path.display())];
@@ -34,8 +41,6 @@ pub fn check(folder: &Path) -> Result<Checkup, Error> {
         }
         other => other?,
     };
-    // With the lock, no writer is between a part and its manifest. A study that cannot be written is read without.
-    let _lock = Lock::exclusive(&folder.join(LOCK)).ok();
     for (name, expected) in &manifest.files {
         match FileRecord::of(&folder.join(name)) {
             Ok(found) if found == *expected => {}

@@ -18,12 +18,16 @@ use parquet::file::reader::ChunkReader;
 use super::{Manifest, store};
 use crate::Error;
 use crate::error::io;
-use crate::project::Projected;
+use crate::project::{Projected, ProjectedState};
 
 /// Folder of the parts in a study.
 pub(crate) const FOLDER: &str = "coefficients";
 /// What a part is called before its content has given it a name.
 const PART: &str = "part";
+/// Row group of the last states of a part's runs: most questions read nothing else.
+const LAST_STATES: usize = 0;
+/// Key of the basis' content name in a part's metadata.
+const BASIS: &str = "crumple.basis";
 const COMPONENTS: [char; 3] = ['x', 'y', 'z'];
 const MEASURES: [&str; 6] = ["rms", "max", "captured", "rigid_share", "strain_median", "strain_p95"];
 
@@ -66,6 +70,14 @@ impl Coefficients {
         &self.values[row * width..(row + 1) * width]
     }
 
+    /// Adds the rows of another part.
+    pub(crate) fn append(&mut self, mut other: Self) {
+        self.runs.append(&mut other.runs);
+        self.states.append(&mut other.states);
+        self.times.append(&mut other.times);
+        self.values.append(&mut other.values);
+    }
+
     /// Sorts rows by run and state, so that the order in which parts came does not matter.
     pub(crate) fn sorted(self) -> Self {
         let mut order: Vec<usize> = (0..self.rows()).collect();
@@ -84,7 +96,14 @@ impl Coefficients {
 /// Writes runs as one part into the study's folder; returns its path below the study.
 pub(crate) fn write_part(folder: &Path, basis: &str, runs: &[Projected]) -> Result<String, Error> {
     let staged = store::Staged::beside(&folder.join(FOLDER).join(PART));
-    let batch = record_batch(runs)?;
+    let rows = || {
+        runs.iter().flat_map(|run| {
+            run.states.iter().zip(0..).map(|(state, index)| (run.run.as_str(), index, run.states.len(), state))
+        })
+    };
+    let is_last = |&(_, index, states, _): &(&str, u32, usize, &ProjectedState)| index as usize + 1 == states;
+    let last = record_batch(rows().filter(is_last))?;
+    let others = record_batch(rows().filter(|row| !is_last(row)))?;
     let internal = |error: parquet::errors::ParquetError| match error {
         parquet::errors::ParquetError::External(source) => match source.downcast::<std::io::Error>() {
             Ok(source) => io("write", folder)(*source),
@@ -99,14 +118,15 @@ pub(crate) fn write_part(folder: &Path, basis: &str, runs: &[Projected]) -> Resu
         .set_dictionary_enabled(false)
         .set_column_dictionary_enabled("run".into(), true)
         .set_created_by(format!("crumple {}", env!("CARGO_PKG_VERSION")));
-    properties = properties.set_key_value_metadata(Some(vec![parquet::file::metadata::KeyValue::new(
-        "crumple.basis".to_owned(),
-        basis.to_owned(),
-    )]));
+    properties = properties
+        .set_key_value_metadata(Some(vec![parquet::file::metadata::KeyValue::new(BASIS.to_owned(), basis.to_owned())]));
     let file = staged.create(folder)?;
-    let mut writer = ArrowWriter::try_new(std::io::BufWriter::new(file), batch.schema(), Some(properties.build()))
+    let mut writer = ArrowWriter::try_new(std::io::BufWriter::new(file), last.schema(), Some(properties.build()))
         .map_err(internal)?;
-    writer.write(&batch).map_err(internal)?;
+    writer.write(&last).and_then(|()| writer.flush()).map_err(internal)?;
+    if others.num_rows() > 0 {
+        writer.write(&others).map_err(internal)?;
+    }
     let file =
         writer.into_inner().map_err(internal)?.into_inner().map_err(|error| io("write", folder)(error.into_error()))?;
     file.sync_all().map_err(io("write", folder))?;
@@ -116,11 +136,10 @@ pub(crate) fn write_part(folder: &Path, basis: &str, runs: &[Projected]) -> Resu
     Ok(name)
 }
 
-fn record_batch(runs: &[Projected]) -> Result<RecordBatch, Error> {
-    let rows: Vec<(&str, u32, &crate::project::ProjectedState)> = runs
-        .iter()
-        .flat_map(|run| run.states.iter().zip(0..).map(|(state, index)| (run.run.as_str(), index, state)))
-        .collect();
+fn record_batch<'a>(
+    rows: impl Iterator<Item = (&'a str, u32, usize, &'a ProjectedState)>,
+) -> Result<RecordBatch, Error> {
+    let rows: Vec<(&str, u32, &ProjectedState)> = rows.map(|(run, index, _, state)| (run, index, state)).collect();
     let width = rows.first().map_or(0, |(_, _, state)| state.delta.len());
     let mut fields = vec![
         Field::new("run", DataType::Utf8, false),
@@ -161,17 +180,31 @@ pub fn column_name(function: Function, eigenvector: usize, component: usize) -> 
     format!("{letter}{eigenvector}_{}", COMPONENTS[component])
 }
 
-/// Reads the rows of a part that `keep` accepts (by run and state), only the columns of the named eigenvectors, and
-/// appends them to `into`, whose `eigenvectors` say which.
+/// Which rows of a part are wanted.
+pub(crate) struct Wanted<'a> {
+    /// Content name of the study's basis.
+    pub(crate) basis: &'a str,
+    /// Only last states; they have a row group of their own.
+    pub(crate) last: bool,
+    /// Says yes by run and state.
+    pub(crate) keep: &'a (dyn Fn(&str, u32) -> bool + Sync),
+}
+
+/// Reads the rows of a part that are wanted, only the columns of the named eigenvectors, and appends them to `into`,
+/// whose `eigenvectors` say which.
 pub(crate) fn read_part<R: ChunkReader + 'static>(
     source: R,
     path: &Path,
-    keep: &dyn Fn(&str, u32) -> bool,
+    wanted: &Wanted<'_>,
     into: &mut Coefficients,
 ) -> Result<(), Error> {
     let damaged = |what: String| Error::Damaged { path: path.to_owned(), what };
     let builder = ParquetRecordBatchReaderBuilder::try_new(source).map_err(|error| damaged(error.to_string()))?;
     let function = into.function;
+    let entries = builder.metadata().file_metadata().key_value_metadata().into_iter().flatten();
+    if !entries.clone().any(|entry| entry.key == BASIS && entry.value.as_deref() == Some(wanted.basis)) {
+        return Err(damaged("it belongs to another eigenbasis than the study's".into()));
+    }
     let names = ["run", "state", "time"].map(str::to_owned).into_iter();
     let names: Vec<String> =
         names.chain(into.eigenvectors.iter().flat_map(|&j| (0..3).map(move |c| column_name(function, j, c)))).collect();
@@ -183,6 +216,7 @@ pub(crate) fn read_part<R: ChunkReader + 'static>(
         .map(|name| by_name.get(name.as_str()).copied().ok_or_else(|| damaged(format!("no column '{name}'"))))
         .collect::<Result<_, _>>()?;
     let mask = ProjectionMask::leaves(schema, leaves);
+    let builder = if wanted.last { builder.with_row_groups(vec![LAST_STATES]) } else { builder };
     let reader = builder.with_projection(mask).build().map_err(|error| damaged(error.to_string()))?;
     for batch in reader {
         let batch = batch.map_err(|error| damaged(error.to_string()))?;
@@ -199,7 +233,7 @@ pub(crate) fn read_part<R: ChunkReader + 'static>(
                 )
             })
             .collect::<Result<_, _>>()?;
-        for row in (0..batch.num_rows()).filter(|&row| keep(runs.value(row), states[row])) {
+        for row in (0..batch.num_rows()).filter(|&row| (wanted.keep)(runs.value(row), states[row])) {
             into.runs.push(runs.value(row).to_owned());
             into.states.push(states[row]);
             into.times.push(times[row]);
@@ -211,7 +245,7 @@ pub(crate) fn read_part<R: ChunkReader + 'static>(
 
 /// What a killed writer leaves behind: parts that no manifest names, and temporary files.
 pub(crate) fn litter(folder: &Path, manifest: &Manifest) -> Result<Vec<PathBuf>, Error> {
-    let tables = ["manifest.json", "runs.parquet", "modes.parquet"];
+    let tables = ["manifest.json", "runs.parquet", "modes.parquet", "report.html"];
     let mut paths: Vec<PathBuf> = tables.iter().flat_map(|name| store::temporaries(folder, name)).collect();
     paths.extend(store::temporaries(&folder.join(super::DESCRIPTORS), ""));
     let parts = folder.join(FOLDER);

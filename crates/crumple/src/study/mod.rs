@@ -25,10 +25,12 @@ mod mesh_file;
 pub(crate) mod store;
 mod tables;
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use mesh_spectrum::Watch;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 pub use add::{AddOptions, Added};
@@ -37,7 +39,7 @@ pub use coefficients::{Coefficients, Function, column_name};
 pub use manifest::{FileRecord, LAYOUT, Manifest, RunRecord};
 pub use mesh_file::write_shape;
 pub use tables::write_columns;
-pub(crate) use tables::{Column, metadata_of};
+pub(crate) use tables::{Column, add_inputs, metadata_of};
 
 use crate::Error;
 use crate::basis::{Basis, BasisOptions};
@@ -173,6 +175,8 @@ impl Study {
         options: &BasisOptions,
         watch: &dyn Watch,
     ) -> Result<Self, Error> {
+        // A name is needed to stage beside it: `.` has none.
+        let folder = &if folder.exists() { absolute(folder) } else { folder.to_owned() };
         if folder.exists() && !is_empty_folder(folder) {
             let what = if folder.join(manifest::FILE).exists() {
                 "a study is here already"
@@ -310,37 +314,39 @@ impl Study {
                 &all
             }
         };
-        let mut result = Coefficients { function, eigenvectors: eigenvectors.to_vec(), ..Default::default() };
-        let parts: std::collections::BTreeSet<&str> = self
-            .manifest
-            .runs
-            .iter()
-            .filter(|(id, _)| !matches!(rows, Rows::Run(run) if run != id.as_str()))
-            .map(|(_, run)| run.part.as_str())
-            .collect();
-        for part in parts {
+        let empty = || Coefficients { function, eigenvectors: eigenvectors.to_vec(), ..Default::default() };
+        let wanted = |id: &str| !matches!(rows, Rows::Run(run) if run != id);
+        let runs = || self.manifest.runs.iter().filter(|(id, _)| wanted(id));
+        let parts: BTreeSet<&str> = runs().map(|(_, run)| run.part.as_str()).collect();
+        let read = |part: &&str| {
             // A run that was replaced has rows in an old part too; only the part that the manifest names counts.
             let keep = |run: &str, state: u32| {
-                self.manifest.runs.get(run).is_some_and(|record| {
-                    record.part == part
-                        && match rows {
-                            Rows::Last => state as usize + 1 == record.times.len(),
-                            Rows::All => true,
-                            Rows::Run(wanted) => run == wanted,
-                        }
-                })
+                let last = |times: &[f64]| rows != Rows::Last || state as usize + 1 == times.len();
+                wanted(run)
+                    && self.manifest.runs.get(run).is_some_and(|record| record.part == *part && last(&record.times))
             };
             let path = self.folder.join(part);
-            let file = match std::fs::File::open(&path) {
-                Err(error) if error.kind() == std::io::ErrorKind::NotFound && self.is_behind()? => {
-                    // Another process has replaced runs since this study was opened, and cleared their old part.
-                    let mut now = self.clone();
-                    now.refresh()?;
-                    return now.coefficients_of(function, Some(eigenvectors), rows);
-                }
-                other => other.map_err(io("read", &path))?,
-            };
-            coefficients::read_part(file, &path, &keep, &mut result)?;
+            let file = std::fs::File::open(&path).map_err(io("read", &path))?;
+            let mut found = empty();
+            let wanted = coefficients::Wanted { basis: &self.manifest.basis, last: rows == Rows::Last, keep: &keep };
+            coefficients::read_part(file, &path, &wanted, &mut found)?;
+            Ok(found)
+        };
+        let found: Vec<Coefficients> = match parts.iter().collect::<Vec<_>>().into_par_iter().map(read).collect() {
+            Err(Error::Io { source, .. }) if source.kind() == std::io::ErrorKind::NotFound && self.is_behind()? => {
+                // Another process has replaced runs since this study was opened, and cleared their old part.
+                let mut now = self.clone();
+                now.refresh()?;
+                return now.coefficients_of(function, Some(eigenvectors), rows);
+            }
+            other => other?,
+        };
+        let mut result = empty();
+        found.into_iter().for_each(|part| result.append(part));
+        let expected: usize = runs().map(|(_, run)| if rows == Rows::Last { 1 } else { run.times.len() }).sum();
+        if result.rows() != expected {
+            let what = format!("{} states found in its parts, the manifest says {expected}", result.rows());
+            return Err(Error::Damaged { path: self.folder.join(coefficients::FOLDER), what });
         }
         Ok(result.sorted())
     }

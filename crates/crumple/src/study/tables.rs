@@ -120,13 +120,20 @@ pub(crate) fn write_runs(folder: &Path, manifest: &Manifest) -> Result<(), Error
         ("strain_p95".to_owned(), number(&|run| run.last.strain_p95)),
         ("warnings".to_owned(), text(&|run| run.warnings.join("; "))),
     ];
-    for name in &manifest.inputs {
-        let values = runs.iter().map(|run| run.inputs.get(name).map(String::as_str)).collect();
-        // An input called like a column of ours keeps its name with a mark.
-        let taken = columns.iter().any(|(column, _)| column == name);
-        columns.push((if taken { format!("input_{name}") } else { name.clone() }, Column::of_texts(values)));
-    }
+    add_inputs(&mut columns, manifest);
     write_columns(&folder.join("runs.parquet"), &columns, None)
+}
+
+/// Appends the inputs of the runs; one that is called like a column that is there gets `input_` before its name.
+pub(crate) fn add_inputs(columns: &mut Vec<(String, Column)>, manifest: &Manifest) {
+    for input in &manifest.inputs {
+        let values = manifest.runs.values().map(|run| run.inputs.get(input).map(String::as_str)).collect();
+        let mut name = input.clone();
+        while columns.iter().any(|(column, _)| *column == name) {
+            name = format!("input_{name}");
+        }
+        columns.push((name, Column::of_texts(values)));
+    }
 }
 
 /// One text column of a table.
