@@ -118,7 +118,7 @@ impl Manifest {
     /// # Errors
     /// [`Error::Io`]; the old manifest stays.
     pub(crate) fn write(&self, folder: &Path) -> Result<(), Error> {
-        let text = serde_json::to_string(self).map_err(|error| Error::Internal(error.to_string()))?;
+        let text = serde_json::to_string_pretty(self).map_err(|error| Error::Internal(error.to_string()))?;
         store::write_bytes(&folder.join(FILE), text.as_bytes())
     }
 }
