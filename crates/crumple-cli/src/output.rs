@@ -73,3 +73,8 @@ pub(crate) fn percent(fraction: Option<f64>) -> String {
 pub(crate) fn two(value: Option<f64>) -> String {
     value.map_or_else(|| "–".into(), |value| format!("{value:.2}"))
 }
+
+/// A time as a person reads it: with the digits that a single-precision file has.
+pub(crate) fn time(time: f64) -> String {
+    (time as f32).to_string()
+}

@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 
 use super::Answer;
 use crate::options::DescribeArgs;
-use crate::output::{Output, percent, table};
+use crate::output::{Output, percent, table, time};
 
 #[derive(Args)]
 #[command(
@@ -77,7 +77,7 @@ fn words(descriptor: &Descriptor, unit: &str) -> String {
         "descriptor '{}' of {} at time {}: M = {m} eigenvectors, {} numbers ({} above t = {:.4} {unit}², rule {})\neigenvectors {}\n",
         descriptor.name,
         descriptor.run,
-        descriptor.time,
+        time(descriptor.time),
         3 * m,
         descriptor.select.word(),
         descriptor.threshold,

@@ -7,7 +7,7 @@ use crumple::{Error, run::Run};
 use serde_json::json;
 
 use super::Answer;
-use crate::output::{Output, table};
+use crate::output::{Output, table, time};
 
 #[derive(Args)]
 #[command(after_help = "Example, in the repository:\n  crumple info examples/hat-section/runs/run_001")]
@@ -26,8 +26,8 @@ impl Info {
             let e = &info.elements;
             let times = match &info.times[..] {
                 [] => "none".to_owned(),
-                [only] => format!("1, at time {only}"),
-                [first, .., last] => format!("{}, from time {first} to {last}", info.times.len()),
+                [only] => format!("1, at time {}", time(*only)),
+                [first, .., last] => format!("{}, from time {} to {}", info.times.len(), time(*first), time(*last)),
             };
             let mut text = format!(
                 "{}\n{}, {} precision, {}-endian, release {}, {} files\nnodes     {}\nelements  {} shells, {} solids, {} thick shells, {} beams, {} SPH\nstates    {times}\nfields    {}\n",

@@ -11,7 +11,7 @@ use serde_json::json;
 
 use super::Answer;
 use crate::options::{SimilarityArgs, rows};
-use crate::output::{Output, table};
+use crate::output::{Output, table, time};
 
 #[derive(Args)]
 #[command(after_help = "Example:\n  crumple search study mode-1 --top 9")]
@@ -44,7 +44,7 @@ impl Search {
                     rank.to_string(),
                     hit.run.clone(),
                     hit.state.to_string(),
-                    hit.time.to_string(),
+                    time(hit.time),
                     format!("{:.4}", hit.score.similarity),
                 ]
             });
