@@ -73,16 +73,9 @@ pub struct PartInfo {
     pub id: u64,
     /// Its title.
     pub title: String,
-    /// Solids.
-    pub solids: usize,
-    /// Thick shells.
-    pub thick_shells: usize,
-    /// Beams.
-    pub beams: usize,
-    /// Shells.
-    pub shells: usize,
-    /// SPH particles.
-    pub sph: usize,
+    /// Its elements.
+    #[serde(flatten)]
+    pub elements: Elements,
 }
 
 /// A file of a family.
@@ -190,11 +183,13 @@ impl Run {
         let part = |part: &d3plot::Part| PartInfo {
             id: part.id,
             title: part.title.clone(),
-            solids: part.solids,
-            thick_shells: part.thick_shells,
-            beams: part.beams,
-            shells: part.shells,
-            sph: part.sph,
+            elements: Elements {
+                solids: part.solids,
+                thick_shells: part.thick_shells,
+                beams: part.beams,
+                shells: part.shells,
+                sph: part.sph,
+            },
         };
         Info {
             format: header.file_type.name().to_owned(),

@@ -46,7 +46,8 @@ impl Info {
                 info.fields.join(", ")
             );
             let rows = info.parts.iter().map(|part| {
-                let counts = [part.shells, part.solids, part.thick_shells, part.beams, part.sph];
+                let e = &part.elements;
+                let counts = [e.shells, e.solids, e.thick_shells, e.beams, e.sph];
                 std::iter::once(part.id.to_string()).chain([part.title.trim().to_owned()]).chain(counts.map(|count| count.to_string())).collect()
             });
             text += &table(&["#part", "title", "#shells", "#solids", "#thick shells", "#beams", "#SPH"], rows);

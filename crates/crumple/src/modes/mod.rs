@@ -9,6 +9,7 @@ mod agglomerative;
 mod evidence;
 mod file;
 mod kmeans;
+mod points;
 
 use std::str::FromStr;
 
@@ -18,10 +19,10 @@ use serde::{Deserialize, Serialize};
 pub use evidence::adjusted_rand_index;
 pub(crate) use evidence::silhouettes;
 pub use file::{load, save};
+pub(crate) use points::{Distances, Points, square_distance};
 
 use crate::Error;
-use crate::rotation::spectrum;
-use crate::study::{Coefficients, Function, Rows, Study};
+use crate::study::{Function, Rows, Study};
 
 /// How to group.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -258,117 +259,6 @@ fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     let middle = values.len() / 2;
     if values.len().is_multiple_of(2) { (values[middle - 1] + values[middle]) / 2.0 } else { values[middle] }
-}
-
-/// One point a run.
-pub(crate) struct Points {
-    pub(crate) width: usize,
-    pub(crate) values: Vec<f64>,
-}
-
-impl Points {
-    /// Coefficients in RMS lengths.
-    pub(crate) fn by_displacement(rows: &Coefficients, area: f64) -> Self {
-        let scale = 1.0 / area.sqrt();
-        let (count, width) = (rows.rows(), 3 * rows.eigenvectors.len());
-        let values: Vec<f64> = rows.values.iter().map(|&x| f64::from(x) * scale).collect();
-        if count >= width {
-            return Self { width, values };
-        }
-        // Fewer points than coordinates: with X = Rᵀ Qᵀ the rows of Rᵀ are the same points in a frame of their own
-        // span, all distances kept, and everything below costs that much less.
-        let factor = faer::MatRef::from_column_major_slice(&values, width, count).qr();
-        let r = factor.thin_R();
-        let values = (0..count).flat_map(|run| (0..count).map(move |at| r[(at, run)])).collect();
-        Self { width: count, values }
-    }
-
-    /// Band energies and lowest triples, each block centred by the mean of the runs and scaled by its root mean square
-    /// deviation, so that kind and direction weigh alike; then of length 1, so that distances follow the angle (cosine)
-    /// and a strong and a weak deformation of one kind stay together.
-    pub(crate) fn by_rotation(rows: &Coefficients) -> Self {
-        let spectra: Vec<(Vec<f64>, Vec<f64>)> = (0..rows.rows())
-            .map(|row| {
-                let rho: Vec<[f64; 3]> =
-                    rows.row(row).as_chunks().0.iter().map(|triple: &[f32; 3]| triple.map(f64::from)).collect();
-                spectrum(&rho)
-            })
-            .collect();
-        let (kinds, directions): (Vec<Vec<f64>>, Vec<Vec<f64>>) = spectra.into_iter().unzip();
-        let (kinds, directions) = (standardised(kinds), standardised(directions));
-        let values: Vec<Vec<f64>> =
-            kinds.into_iter().zip(directions).map(|(kind, way)| unit([kind, way].concat())).collect();
-        Self { width: values.first().map_or(0, Vec::len), values: values.concat() }
-    }
-
-    pub(crate) fn count(&self) -> usize {
-        self.values.len() / self.width
-    }
-
-    pub(crate) fn point(&self, run: usize) -> &[f64] {
-        &self.values[run * self.width..(run + 1) * self.width]
-    }
-
-    pub(crate) fn distances(&self) -> Distances {
-        use rayon::prelude::*;
-        let count = self.count();
-        let lengths: Vec<f64> = (0..count).map(|a| self.point(a).iter().map(|x| x * x).sum()).collect();
-        let lengths = &lengths;
-        let row = |a: usize| {
-            (0..count).map(move |b| {
-                let square = square_distance(self.point(a), self.point(b));
-                // Equal runs may differ by rounding, which is no distance.
-                if square > 1e-26 * (lengths[a] + lengths[b]) { square.sqrt() as f32 } else { 0.0 }
-            })
-        };
-        Distances { count, values: (0..count).into_par_iter().flat_map_iter(row).collect() }
-    }
-
-    fn distances_to_mean(&self, members: &[usize]) -> Vec<f64> {
-        let mut mean = vec![0.0; self.width];
-        for &run in members {
-            mean.iter_mut().zip(self.point(run)).for_each(|(mean, x)| *mean += x / members.len() as f64);
-        }
-        members.iter().map(|&run| square_distance(self.point(run), &mean).sqrt()).collect()
-    }
-}
-
-/// Centred, and divided by the root mean square length of the rows; rows that are all equal become zero.
-fn standardised(mut rows: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
-    let count = rows.len() as f64;
-    let mut mean = vec![0.0; rows.first().map_or(0, Vec::len)];
-    rows.iter().for_each(|row| mean.iter_mut().zip(row).for_each(|(mean, x)| *mean += x / count));
-    rows.iter_mut().for_each(|row| row.iter_mut().zip(&mean).for_each(|(x, mean)| *x -= mean));
-    let length = (rows.iter().flatten().map(|x| x * x).sum::<f64>() / count).sqrt();
-    if length > 0.0 {
-        rows.iter_mut().flatten().for_each(|x| *x /= length);
-    }
-    rows
-}
-
-/// Of length 1; a zero row stays zero.
-fn unit(mut row: Vec<f64>) -> Vec<f64> {
-    let length = row.iter().map(|x| x * x).sum::<f64>().sqrt();
-    if length > 0.0 {
-        row.iter_mut().for_each(|x| *x /= length);
-    }
-    row
-}
-
-pub(crate) fn square_distance(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum()
-}
-
-/// All distances between runs; f32, so that ten thousand runs take 400 MB.
-pub(crate) struct Distances {
-    pub(crate) count: usize,
-    values: Vec<f32>,
-}
-
-impl Distances {
-    pub(crate) fn between(&self, a: usize, b: usize) -> f64 {
-        f64::from(self.values[a * self.count + b])
-    }
 }
 
 impl FromStr for By {

@@ -9,15 +9,15 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::picture::{View, picture};
-use super::thin::Thin;
+use super::shapes::{MeshData, plain, shapes, z_displacement};
+use super::words::{isometry_words, join_words, mode_words, warnings};
 use crate::Error;
-use crate::basis::synthesize;
 use crate::descriptor::{self, DescribeOptions, Described, FIRST_M, Rival, Threshold, describe};
 use crate::modes::{By, Mode, Modes, Tried};
-use crate::reconstruct::{Errors, displaced};
+use crate::reconstruct::Errors;
 use crate::similarity::{Comparer, SimilarityOptions};
 use crate::study::{Loaded, Rows, RunRecord};
-use crate::target::{self, Named, Target};
+use crate::target::Named;
 
 /// What the page gets.
 #[derive(Debug, Clone, Serialize)]
@@ -56,18 +56,6 @@ struct StudyFacts {
     states: usize,
     captured: f64,
     isometry: Option<String>,
-}
-
-#[derive(Debug, Clone, Serialize)]
-struct MeshData {
-    /// Little-endian u32, 3 a triangle, base64.
-    triangles: String,
-    vertices: usize,
-    /// A position is origin + step × u16.
-    origin: [f64; 3],
-    step: f64,
-    /// Colours span −range to range of z-displacement, in the length unit.
-    range: f64,
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -138,9 +126,6 @@ impl Findings {
 
 /// Name of a mode, and the similarity of each run to its descriptor, runs in the order of the manifest.
 type Similarities = (String, Vec<(String, f64)>);
-
-/// Shapes on the page take at most this many bytes before base64.
-const SHAPE_BYTES: usize = 3_500_000;
 
 /// Gathers the findings of a study whose modes are known. A mode's descriptor is made as the saved descriptor of its
 /// name was, or by `options` where there is none.
@@ -240,45 +225,6 @@ fn study_facts(loaded: &Loaded) -> StudyFacts {
     }
 }
 
-/// In words: the mesh is several pieces, what that does, and what helps.
-pub(crate) fn join_words(components: usize, distance: f64, unit: &str) -> String {
-    format!(
-        "the mesh is {components} pieces that share no nodes, a small distance apart; each has a spectrum of its own, equal pieces bring nearly equal eigenvalues in pairs. \
-         To treat them as one part: --join {distance} ({unit})"
-    )
-}
-
-/// How far the surfaces are from isometric, in words.
-fn isometry_words(records: &[&RunRecord]) -> Option<String> {
-    let mut strains: Vec<f64> = records.iter().map(|run| run.last.strain_p95).collect();
-    strains.sort_by(f64::total_cmp);
-    let median = *strains.get(strains.len() / 2)?;
-    let thin = if median > 0.1 {
-        "; the method assumes that the surface hardly stretches, and here it does in places, so compare shapes, not small differences"
-    } else {
-        ""
-    };
-    Some(format!(
-        "in the last state of a typical run, 95 % of the edges change their length by less than {:.1} %{thin}",
-        100.0 * median
-    ))
-}
-
-fn warnings(loaded: &Loaded) -> Vec<String> {
-    let facts = &loaded.basis.facts;
-    let mut warnings = Vec::new();
-    if facts.non_manifold_edges > 0 {
-        warnings.push(format!(
-            "{} edges of the mesh have more than two faces; all their faces are summed",
-            facts.non_manifold_edges
-        ));
-    }
-    if facts.flat_triangles > 0 {
-        warnings.push(format!("{} triangles without area are left out of the operator", facts.flat_triangles));
-    }
-    warnings
-}
-
 /// Similarity of every run to every mode's descriptor.
 fn similarities(loaded: &Loaded, described: &[Described]) -> Result<Vec<Similarities>, Error> {
     let of = |described: &Described| {
@@ -328,10 +274,6 @@ fn run_data(loaded: &Loaded, modes: &Modes, cloud: usize, similarity: &[Similari
         }
     });
     Ok(data.collect())
-}
-
-fn z_displacement(loaded: &Loaded, shape: &[[f64; 3]]) -> Vec<f64> {
-    shape.iter().zip(loaded.reference.mesh.vertices()).map(|(p, q)| p[2] - q[2]).collect()
 }
 
 fn mode_data(
@@ -385,97 +327,8 @@ fn mode_data(
     }
 }
 
-/// Rounded up to two significant digits, for a legend.
-fn plain(range: f64) -> f64 {
-    if range <= 0.0 {
-        return 0.0;
-    }
-    let unit = 10.0_f64.powf(range.log10().floor() - 1.0);
-    (range / unit).ceil() * unit
-}
-
 /// `first M` with its number: the page tells its pictures apart by it.
 fn named_for_the_page(rival: &Rival) -> Rival {
     let method = if rival.method == FIRST_M { format!("first {}", rival.size) } else { rival.method.clone() };
     Rival { method, ..rival.clone() }
-}
-
-/// What the medoid did, in numbers that an engineer reads off a picture: the change along its longest axis, and how
-/// far it rose and fell.
-fn mode_words(loaded: &Loaded, shape: &[[f64; 3]]) -> String {
-    let before = loaded.reference.mesh.vertices();
-    let unit = &loaded.study.settings().length_unit;
-    let extent = |points: &[[f64; 3]], c: usize| {
-        let (low, high) =
-            points.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), p| (low.min(p[c]), high.max(p[c])));
-        high - low
-    };
-    let axis = (0..3).max_by(|&a, &b| extent(before, a).total_cmp(&extent(before, b))).unwrap_or(0);
-    let (rise, fall) = z_displacement(loaded, shape)
-        .into_iter()
-        .fold((0.0_f64, 0.0_f64), |(rise, fall), z| (rise.max(z), fall.min(z)));
-    format!(
-        "{} from {:.0} to {:.0} {unit} along {}; rises by up to {rise:.0} {unit}, falls by up to {:.0} {unit} (z)",
-        if extent(shape, axis) < extent(before, axis) { "shortens" } else { "grows" },
-        extent(before, axis),
-        extent(shape, axis),
-        ['x', 'y', 'z'][axis],
-        -fall
-    )
-}
-
-/// Quantised shapes: those of the modes, then as many runs as the page has room for.
-fn shapes(
-    loaded: &Loaded,
-    modes: &Modes,
-    described: &[Described],
-    range: f64,
-) -> Result<(MeshData, BTreeMap<String, String>), Error> {
-    let reference = &loaded.reference;
-    let needed = 4 * described.len() + 1;
-    let thin = Thin::of(reference.mesh.vertices(), reference.mesh.triangles(), (SHAPE_BYTES / 6 / needed).max(1000));
-    let mut wanted: Vec<(String, Vec<[f64; 3]>)> = vec![("reference".into(), thin.shape(reference.mesh.vertices()))];
-    for (mode, described) in modes.modes.iter().zip(described) {
-        wanted.push((format!("run:{}", mode.medoid), thin.shape(&described.original)));
-        wanted.push((format!("{}:first_k", mode.name), thin.shape(&described.first_k)));
-        wanted.push((format!("{}:descriptor", mode.name), thin.shape(&described.reconstruction)));
-        wanted.push((format!("{}:first_m", mode.name), thin.shape(&described.first_m)));
-    }
-    let room = (SHAPE_BYTES / (6 * thin.vertices.len())).saturating_sub(wanted.len());
-    let rows = loaded.last_states()?;
-    let runs = &rows.runs;
-    let others: Vec<usize> =
-        (0..runs.len()).filter(|&row| modes.modes.iter().all(|mode| mode.medoid != runs[row])).take(room).collect();
-    let read = |row: usize| Ok((format!("run:{}", runs[row]), thin.shape(&last_shape(loaded, row)?)));
-    wanted.extend(others.into_par_iter().map(read).collect::<Result<Vec<_>, Error>>()?);
-    let points = || wanted.iter().flat_map(|(_, shape)| shape);
-    let origin: [f64; 3] = std::array::from_fn(|c| points().map(|p| p[c]).fold(f64::INFINITY, f64::min));
-    let extent = (0..3).map(|c| points().map(|p| p[c] - origin[c]).fold(0.0, f64::max)).fold(0.0, f64::max);
-    let step = if extent > 0.0 { extent / 65535.0 } else { 1.0 };
-    let encode = |bytes: Vec<u8>| base64::engine::general_purpose::STANDARD.encode(bytes);
-    let quantised = |shape: &[[f64; 3]]| {
-        encode(
-            shape
-                .iter()
-                .flat_map(|p| (0..3).flat_map(|c| (((p[c] - origin[c]) / step).round() as u16).to_le_bytes()))
-                .collect(),
-        )
-    };
-    let shapes = wanted.iter().map(|(name, shape)| (name.clone(), quantised(shape))).collect();
-    let triangles = encode(thin.triangles.iter().flatten().flat_map(|vertex| vertex.to_le_bytes()).collect());
-    Ok((MeshData { triangles, vertices: thin.vertices.len(), origin, step, range }, shapes))
-}
-
-/// The last state of a run from its file; where that is gone or another one, from its K coefficients.
-fn last_shape(loaded: &Loaded, row: usize) -> Result<Vec<[f64; 3]>, Error> {
-    let rows = loaded.last_states()?;
-    let delta: Vec<[f64; 3]> =
-        rows.row(row).as_chunks().0.iter().map(|triple: &[f32; 3]| triple.map(f64::from)).collect();
-    let run = rows.runs[row].clone();
-    let target = Target { run: run.clone(), state: rows.states[row] as usize, time: rows.times[row], delta };
-    let from_file = target::shape(loaded, &Named { run, state: None }, &target);
-    Ok(from_file.unwrap_or_else(|_| {
-        let all: Vec<usize> = (1..=loaded.basis.eigenpairs()).collect();
-        displaced(&loaded.reference, &synthesize(&loaded.basis, &all, &target.delta))
-    }))
 }

@@ -6,7 +6,9 @@
 mod findings;
 mod page;
 pub mod picture;
+mod shapes;
 mod thin;
+mod words;
 
 pub use findings::{Findings, findings};
 pub use page::{page, save, write};

@@ -20,14 +20,15 @@ mod add;
 mod basis_file;
 mod check;
 mod coefficients;
+mod loaded;
 mod manifest;
 mod mesh_file;
+mod staged;
 pub(crate) mod store;
 mod tables;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
 
 use mesh_spectrum::Watch;
 use rayon::prelude::*;
@@ -36,10 +37,13 @@ use serde::{Deserialize, Serialize};
 pub use add::{AddOptions, Added};
 pub use check::{Checkup, check};
 pub use coefficients::{Coefficients, Function, column_name};
+pub use loaded::Loaded;
 pub use manifest::{FileRecord, LAYOUT, Manifest, RunRecord};
 pub use mesh_file::write_shape;
 pub use tables::write_columns;
 pub(crate) use tables::{Column, add_inputs, metadata_of};
+
+use staged::StagedFolder;
 
 use crate::Error;
 use crate::basis::{Basis, BasisOptions};
@@ -77,70 +81,6 @@ pub struct Settings {
     pub length_unit: String,
     /// Unit of times: a label, nothing is converted.
     pub time_unit: String,
-}
-
-/// A study with its mesh and basis in memory: what most questions need.
-#[derive(Debug)]
-pub struct Loaded {
-    /// The study.
-    pub study: Study,
-    /// Its reference mesh.
-    pub reference: Reference,
-    /// Its eigenbasis.
-    pub basis: Basis,
-    last_states: Mutex<Option<Kept>>,
-}
-
-/// Last states, and the runs and parts they were read from, so that a study that has changed since is read again.
-#[derive(Debug)]
-struct Kept {
-    of: Vec<(String, String)>,
-    rows: Arc<Coefficients>,
-}
-
-impl Loaded {
-    /// Opens a study and reads mesh and basis.
-    ///
-    /// # Errors
-    /// As [`Study::open`], [`Study::reference`], [`Study::basis`].
-    pub fn open(folder: &Path) -> Result<Self, Error> {
-        Self::of(Study::open(folder)?)
-    }
-
-    /// Reads mesh and basis of a study.
-    ///
-    /// # Errors
-    /// As [`Study::reference`], [`Study::basis`].
-    pub fn of(study: Study) -> Result<Self, Error> {
-        let (reference, basis) = (study.reference()?, study.basis()?);
-        let (vertices, eigenpairs) = (study.manifest.vertices, study.manifest.eigenpairs);
-        if reference.vertices() != vertices || basis.vertices() != vertices || basis.eigenpairs() != eigenpairs {
-            let what = format!(
-                "mesh, basis and manifest do not fit together: {} and {} vertices, {vertices} expected",
-                reference.vertices(),
-                basis.vertices()
-            );
-            return Err(Error::Damaged { path: study.folder.join(basis_file::FILE), what });
-        }
-        Ok(Self { study, reference, basis, last_states: Mutex::default() })
-    }
-}
-
-impl Loaded {
-    /// All K coefficients of the last state of every run, read once.
-    ///
-    /// # Errors
-    /// As [`Study::coefficients`].
-    pub fn last_states(&self) -> Result<Arc<Coefficients>, Error> {
-        let now: Vec<_> = self.study.manifest.runs.iter().map(|(id, run)| (id.clone(), run.part.clone())).collect();
-        let mut kept = self.last_states.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(kept) = kept.as_ref().filter(|kept| kept.of == now) {
-            return Ok(Arc::clone(&kept.rows));
-        }
-        let rows = Arc::new(self.study.coefficients(None, Rows::Last)?);
-        *kept = Some(Kept { of: now, rows: Arc::clone(&rows) });
-        Ok(rows)
-    }
 }
 
 /// Which rows of the coefficients are wanted.
@@ -392,40 +332,4 @@ pub(crate) fn absolute(path: &Path) -> PathBuf {
 
 fn is_empty_folder(path: &Path) -> bool {
     std::fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none())
-}
-
-/// A folder that is being filled under a temporary name, removed unless it was renamed.
-struct StagedFolder {
-    path: PathBuf,
-    /// Held as long as the folder is being filled: tells the folder of a killed process from that of a live one.
-    _lock: store::Lock,
-}
-
-impl StagedFolder {
-    fn beside(folder: &Path) -> Result<Self, Error> {
-        let parent = folder.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        std::fs::create_dir_all(parent).map_err(io("make the folder", parent))?;
-        for path in store::temporaries(parent, &folder.file_name().unwrap_or_default().to_string_lossy()) {
-            if path.is_dir() && matches!(store::Lock::try_exclusive(&path.join(LOCK)), Ok(Some(_))) {
-                // Left by a killed process; if it cannot be removed it is in nobody's way.
-                let _ = std::fs::remove_dir_all(&path);
-            }
-        }
-        let path = store::temporary_name(folder);
-        std::fs::create_dir(&path).map_err(io("make the folder", folder))?;
-        let lock = store::Lock::exclusive(&path.join(LOCK))?;
-        Ok(Self { path, _lock: lock })
-    }
-
-    fn rename_to(self, folder: &Path) -> Result<(), Error> {
-        // What is renamed is no longer at the old path, and nothing is there for `drop` to remove.
-        std::fs::rename(&self.path, folder).map_err(io("write", folder))
-    }
-}
-
-impl Drop for StagedFolder {
-    fn drop(&mut self) {
-        // The failure that led here is what the user hears of.
-        let _ = std::fs::remove_dir_all(&self.path);
-    }
 }

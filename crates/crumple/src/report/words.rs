@@ -1,0 +1,67 @@
+//! What the page says in sentences.
+
+use super::shapes::z_displacement;
+use crate::study::{Loaded, RunRecord};
+
+/// In words: the mesh is several pieces, what that does, and what helps.
+pub(super) fn join_words(components: usize, distance: f64, unit: &str) -> String {
+    format!(
+        "the mesh is {components} pieces that share no nodes, a small distance apart; each has a spectrum of its own, equal pieces bring nearly equal eigenvalues in pairs. \
+         To treat them as one part: --join {distance} ({unit})"
+    )
+}
+
+/// How far the surfaces are from isometric, in words.
+pub(super) fn isometry_words(records: &[&RunRecord]) -> Option<String> {
+    let mut strains: Vec<f64> = records.iter().map(|run| run.last.strain_p95).collect();
+    strains.sort_by(f64::total_cmp);
+    let median = *strains.get(strains.len() / 2)?;
+    let thin = if median > 0.1 {
+        "; the method assumes that the surface hardly stretches, and here it does in places, so compare shapes, not small differences"
+    } else {
+        ""
+    };
+    Some(format!(
+        "in the last state of a typical run, 95 % of the edges change their length by less than {:.1} %{thin}",
+        100.0 * median
+    ))
+}
+
+pub(super) fn warnings(loaded: &Loaded) -> Vec<String> {
+    let facts = &loaded.basis.facts;
+    let mut warnings = Vec::new();
+    if facts.non_manifold_edges > 0 {
+        warnings.push(format!(
+            "{} edges of the mesh have more than two faces; all their faces are summed",
+            facts.non_manifold_edges
+        ));
+    }
+    if facts.flat_triangles > 0 {
+        warnings.push(format!("{} triangles without area are left out of the operator", facts.flat_triangles));
+    }
+    warnings
+}
+
+/// What the medoid did, in numbers that an engineer reads off a picture: the change along its longest axis, and how
+/// far it rose and fell.
+pub(super) fn mode_words(loaded: &Loaded, shape: &[[f64; 3]]) -> String {
+    let before = loaded.reference.mesh.vertices();
+    let unit = &loaded.study.settings().length_unit;
+    let extent = |points: &[[f64; 3]], c: usize| {
+        let (low, high) =
+            points.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), p| (low.min(p[c]), high.max(p[c])));
+        high - low
+    };
+    let axis = (0..3).max_by(|&a, &b| extent(before, a).total_cmp(&extent(before, b))).unwrap_or(0);
+    let (rise, fall) = z_displacement(loaded, shape)
+        .into_iter()
+        .fold((0.0_f64, 0.0_f64), |(rise, fall), z| (rise.max(z), fall.min(z)));
+    format!(
+        "{} from {:.0} to {:.0} {unit} along {}; rises by up to {rise:.0} {unit}, falls by up to {:.0} {unit} (z)",
+        if extent(shape, axis) < extent(before, axis) { "shortens" } else { "grows" },
+        extent(before, axis),
+        extent(shape, axis),
+        ['x', 'y', 'z'][axis],
+        -fall
+    )
+}
