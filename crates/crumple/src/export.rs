@@ -32,9 +32,9 @@ pub struct ExportOptions<'a> {
     pub last: bool,
 }
 
-/// Writes into `folder`: `eigenvalues.npy` [K], `eigenvectors.npy` [K, N], `mass.npy` [N], `baseline.npy` [K, 3],
-/// `vertices.npy` [N, 3], `triangles.npy` [T, 3], `node_ids.npy` [N], `coefficients.npy` [S, |J|, 3] (δ), and the
-/// tables `coefficients`, `runs` and, where there are modes, `modes`. Returns the files.
+/// Writes into `folder`: `eigenvalues.npy` (K), `eigenvectors.npy` (K × N), `mass.npy` (N), `baseline.npy` (K × 3),
+/// `vertices.npy` (N × 3), `triangles.npy` (T × 3), `node_ids.npy` (N), `coefficients.npy` (states × |J| × 3, δ), and
+/// the tables `coefficients`, `runs` and, where there are modes, `modes`. Returns the files.
 ///
 /// # Errors
 /// [`Error::Io`], reading errors.

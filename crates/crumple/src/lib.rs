@@ -7,7 +7,7 @@
 //! | --- | --- | --- | --- |
 //! | open result files, find and name them | [`run`], [`bundle`] | paths | [`run::Run`] |
 //! | input tables | [`inputs`] | CSV | a row a run |
-//! | the surface all runs share | [`reference`] | a run, parts | [`reference::Reference`] |
+//! | the surface all runs share | [`mod@reference`] | a run, parts | [`reference::Reference`] |
 //! | eigenbasis | [`basis`] | the reference | [`basis::Basis`] |
 //! | how each place has turned | [`rotation`] | a shape | sin θ × axis |
 //! | coefficients of every state | [`project`] | a run | [`project::Projected`] |
