@@ -41,6 +41,15 @@ example:
     cargo run --release -- analyze examples/hat-section/runs --params examples/hat-section/inputs.csv --join 2.5 -o {{ study }}
     test -s {{ study }}/report.html
 
+# the tables of docs/experiment.md and docs/joining.md
+experiment:
+    cargo build --release
+    rm -rf target/plain target/joined
+    target/release/crumple analyze examples/hat-section/runs -o target/plain
+    target/release/crumple analyze examples/hat-section/runs --join 2.5 -o target/joined
+    target/release/crumple compare target/plain --labels examples/hat-section/labels.csv
+    target/release/crumple compare target/joined --labels examples/hat-section/labels.csv
+
 # licences, forbidden crates and sources of Cargo.lock; without network
 deny:
     cargo deny check licenses bans sources

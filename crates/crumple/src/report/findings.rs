@@ -70,6 +70,8 @@ struct RunData {
     id: String,
     mode: Option<String>,
     outlier: bool,
+    states: usize,
+    /// Times of the points of the cloud.
     times: Vec<f64>,
     cloud: Vec<[f64; 3]>,
     similarity: BTreeMap<String, f64>,
@@ -123,6 +125,9 @@ impl Findings {
         &self.title
     }
 }
+
+/// Points of the cloud at the most.
+const POINTS_MAX: usize = 20_000;
 
 /// Name of a mode, and the similarity of each run to its descriptor, runs in the order of the manifest.
 type Similarities = (String, Vec<(String, f64)>);
@@ -242,7 +247,11 @@ fn run_data(loaded: &Loaded, modes: &Modes, cloud: usize, similarity: &[Similari
     let rows = loaded.study.coefficients(Some(&[cloud]), Rows::All)?;
     let mut clouds: BTreeMap<&str, Vec<[f64; 3]>> = BTreeMap::new();
     let baseline = loaded.basis.baseline[cloud - 1];
-    for row in 0..rows.rows() {
+    // A cloud of more points than this is neither seen nor carried; the last state of each run always stays.
+    let stride = rows.rows().div_ceil(POINTS_MAX).max(1);
+    let last = |run: &str| manifest.runs.get(run).map_or(0, |record| record.times.len().saturating_sub(1));
+    let drawn = |run: &str, state: usize| last(run).abs_diff(state).is_multiple_of(stride);
+    for row in (0..rows.rows()).filter(|&row| drawn(&rows.runs[row], rows.states[row] as usize)) {
         let delta = rows.row(row);
         clouds.entry(&rows.runs[row]).or_default().push(std::array::from_fn(|c| baseline[c] + f64::from(delta[c])));
     }
@@ -260,7 +269,14 @@ fn run_data(loaded: &Loaded, modes: &Modes, cloud: usize, similarity: &[Similari
             id: id.clone(),
             mode: member.map(|member| member.mode.clone()),
             outlier: member.is_some_and(|member| member.outlier),
-            times: record.times.clone(),
+            states: record.times.len(),
+            times: record
+                .times
+                .iter()
+                .enumerate()
+                .filter(|(state, _)| drawn(id, *state))
+                .map(|(_, time)| *time)
+                .collect(),
             cloud: clouds.remove(id.as_str()).unwrap_or_default(),
             similarity: by_run.get(id.as_str()).cloned().unwrap_or_default(),
             distance_to_medoid: member.map(|member| member.distance),

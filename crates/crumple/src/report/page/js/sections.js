@@ -78,7 +78,7 @@ function runFacts(run) {
   return [
     ...modes.map((mode) => [`like ${modeTitle(mode.name)}`, run.similarity?.[mode.name], similarity]),
     ["largest displacement", run.max_displacement, (v) => withUnit(v)],
-    ["states", run.times?.length ? run.times : null, (times) => `${count(times.length)}, to ${withUnit(times.at(-1), timeUnit)}`],
+    ["states", run.times?.length ? run.times : null, (times) => `${count(run.states ?? times.length)}, to ${withUnit(times.at(-1), timeUnit)}`],
     ...inputs.map((name, c) => [inputTitle(name), run.inputs?.[c] || null, (v) => breakable(v)]),
     ["notes", run.warnings?.length ? run.warnings.join("; ") : null, (v) => v],
   ].filter(([, value]) => !missing(value)).flatMap(([name, value, show]) => [el("dt", {}, name), el("dd", {}, show(value))]);
