@@ -18,6 +18,7 @@ use output::Output;
 /// spectral coefficients, groups the runs into deformation modes, and finds the runs that behave like a given one.
 #[derive(Parser)]
 #[command(
+    name = "crumple",
     version,
     max_term_width = 120,
     after_help = "Start here, on the example:\n  crumple analyze examples/hat-section/runs --join 2.5 -o study\n\nExit codes: 0 done, 1 the answer is no (verify, check), 2 bad input or failure, 130 interrupted."

@@ -99,19 +99,14 @@ pub(crate) struct DescribeArgs {
 }
 
 impl DescribeArgs {
+    /// What was asked for; `None` where nothing was.
+    pub(crate) fn asked(&self) -> Result<Option<DescribeOptions>, Error> {
+        let options = self.options()?;
+        Ok((self.select.is_some() || self.threshold.is_some()).then_some(options))
+    }
+
     pub(crate) fn options(&self) -> Result<DescribeOptions, Error> {
-        let select = match self.select.as_deref() {
-            None => Select::default(),
-            Some("coordinates") => Select::Coordinates,
-            Some("difference") => Select::Difference,
-            Some(other) => {
-                return Err(Error::Value {
-                    name: "--select",
-                    value: other.into(),
-                    expected: "coordinates or difference".into(),
-                });
-            }
-        };
+        let select = select(self.select.as_deref())?;
         let threshold: Option<Threshold> = self.threshold.as_deref().map(str::parse).transpose()?;
         Ok(DescribeOptions { select, threshold: threshold.unwrap_or_default() })
     }
@@ -136,6 +131,18 @@ impl SimilarityArgs {
         let metric = self.metric.as_deref().map(str::parse).transpose()?.unwrap_or_default();
         let weight = self.weight.as_deref().map(str::parse).transpose()?.unwrap_or_default();
         Ok(SimilarityOptions { centred: self.centred, weight, metric })
+    }
+}
+
+/// `coordinates` or `difference`.
+pub(crate) fn select(text: Option<&str>) -> Result<Select, Error> {
+    match text {
+        None => Ok(Select::default()),
+        Some("coordinates") => Ok(Select::Coordinates),
+        Some("difference") => Ok(Select::Difference),
+        Some(other) => {
+            Err(Error::Value { name: "--select", value: other.into(), expected: "coordinates or difference".into() })
+        }
     }
 }
 

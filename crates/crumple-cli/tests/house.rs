@@ -111,7 +111,9 @@ fn stages_only_use_earlier_ones() {
 fn the_crate_page_names_every_stage() {
     let lib = std::fs::read_to_string(repository().join("crates/crumple/src/lib.rs")).unwrap();
     for stage in STAGES.iter().filter(|stage| **stage != "error") {
-        assert!(lib.contains(&format!("[`{stage}`]")), "{stage} is not in the table");
+        // `mod@` tells the module from a primitive type of the same name.
+        let named = lib.contains(&format!("[`{stage}`]")) || lib.contains(&format!("[`mod@{stage}`]"));
+        assert!(named, "{stage} is not in the table");
     }
 }
 

@@ -81,22 +81,22 @@ pub struct ModesAgreement {
 /// [`Error::NoMatch`] for labels that fit no run, [`Error::NoModes`] without labels and modes, reading errors.
 pub fn compare(loaded: &Loaded, labels: Option<&Table>, threshold: Threshold) -> Result<Comparison, Error> {
     let rows = &*loaded.last_states()?;
-    let (judges, notes) = match labels {
+    let (judge, notes) = match labels {
         Some(table) => Judge::of_labels(rows, loaded, table)?,
         None => (
             Judge::of_modes(rows, loaded)?,
             vec!["without labels there is nothing to judge a ranking by: precision is left out".to_owned()],
         ),
     };
-    let arena = |select| Arena::new(loaded, rows, &judges, select, threshold);
+    let arena = |select| Arena::new(loaded, rows, &judge, select, threshold);
     let arenas = [(Select::Coordinates, arena(Select::Coordinates)?), (Select::Difference, arena(Select::Difference)?)];
     let mut result = Vec::new();
-    for query in &judges.queries {
+    for query in &judge.queries {
         for (select, arena) in &arenas {
             result.extend(judge_query(loaded, arena, query, *select, threshold)?);
         }
     }
-    let modes = if labels.is_some() { agreements(loaded, rows, &judges)? } else { Vec::new() };
+    let modes = if labels.is_some() { agreements(loaded, rows, &judge)? } else { Vec::new() };
     Ok(Comparison { rows: result, modes, notes })
 }
 
@@ -116,9 +116,11 @@ struct Query {
 
 impl Judge {
     fn of_labels(rows: &Coefficients, loaded: &Loaded, table: &Table) -> Result<(Self, Vec<String>), Error> {
-        let column = table.columns.iter().position(|column| column == "label").unwrap_or(0);
-        let clear = table.columns.iter().position(|column| column == "clear");
         let joined = table.join(&rows.runs.iter().map(String::as_str).collect::<Vec<_>>())?;
+        let column = table.columns.iter().position(|column| column == "label");
+        let no_label = || Error::Table { path: table.path.clone(), what: "no column 'label'".into() };
+        let column = column.ok_or_else(no_label)?;
+        let clear = table.columns.iter().position(|column| column == "clear");
         let cell = |row: usize, column: usize| table.rows[row].1.get(column).map_or("", String::as_str);
         let mut names: Vec<&str> =
             joined.row_of_run.iter().flatten().map(|&row| cell(row, column)).filter(|name| !name.is_empty()).collect();
@@ -203,6 +205,7 @@ impl<'a> Arena<'a> {
                 state: rows.states[row] as usize,
                 time: rows.times[row],
                 delta: delta(row),
+                warnings: Vec::new(),
             };
             let original = || target::shape(loaded, &Named { run: target.run.clone(), state: None }, &target);
             Ok(choose(loaded, select, &target.delta, threshold, original)?.eigenvectors)
@@ -315,8 +318,8 @@ pub fn average_precision(right: &[bool]) -> f64 {
     if found == 0 { 0.0 } else { sum / f64::from(found) }
 }
 
-fn agreements(loaded: &Loaded, rows: &Coefficients, judges: &Judge) -> Result<Vec<ModesAgreement>, Error> {
-    let asked = judges.queries.len();
+fn agreements(loaded: &Loaded, rows: &Coefficients, judge: &Judge) -> Result<Vec<ModesAgreement>, Error> {
+    let asked = judge.queries.len();
     let mut result = Vec::new();
     let methods = [modes::Method::KMeans, modes::Method::Ward, modes::Method::Average];
     let ways = [By::Rotation, By::Displacement].into_iter().flat_map(|by| methods.map(|method| (by, method)));
@@ -330,7 +333,7 @@ fn agreements(loaded: &Loaded, rows: &Coefficients, judges: &Judge) -> Result<Ve
                 found.modes.iter().position(|mode| mode.members.iter().any(|member| member == run)).unwrap_or(0)
             };
             let index = |keep: &dyn Fn(usize) -> bool| {
-                let pairs: (Vec<usize>, Vec<usize>) = judges
+                let pairs: (Vec<usize>, Vec<usize>) = judge
                     .label_of_row
                     .iter()
                     .enumerate()
@@ -341,7 +344,7 @@ fn agreements(loaded: &Loaded, rows: &Coefficients, judges: &Judge) -> Result<Ve
                 adjusted_rand_index(&pairs.0, &pairs.1)
             };
             let silhouette = found.runs.iter().map(|run| run.silhouette).sum::<f64>() / found.runs.len() as f64;
-            let queried = |label: usize| judges.queries.iter().any(|query| query.index == label);
+            let queried = |label: usize| judge.queries.iter().any(|query| query.index == label);
             result.push(ModesAgreement {
                 by,
                 method,

@@ -50,7 +50,7 @@ pub enum Error {
         second: PathBuf,
     },
     /// A run without shells, so without a surface.
-    #[error("{run}: no shell elements, so there is no surface to describe ({found})")]
+    #[error("{run}: no shell elements with an area, so there is no surface to describe ({found})")]
     NoSurface {
         /// The run.
         run: String,
@@ -261,7 +261,7 @@ pub enum Error {
         what: String,
     },
     /// A value on the command line or in a call that makes no sense.
-    #[error("{name} = {value}: {expected}")]
+    #[error("{name} = {value}: expected {expected}")]
     Value {
         /// The option's name.
         name: &'static str,
@@ -297,11 +297,16 @@ pub enum Error {
 
 fn list_failures(failures: &[(String, String)]) -> String {
     const SHOWN: usize = 20;
-    let mut text: String = failures.iter().take(SHOWN).map(|(id, why)| format!("\n  {id}: {why}")).collect();
+    let mut text: String = failures.iter().take(SHOWN).map(|(id, why)| format!("\n  {}", with_name(id, why))).collect();
     if failures.len() > SHOWN {
         text += &format!("\n  … and {} more", failures.len() - SHOWN);
     }
     text
+}
+
+/// The reason, with the run's id before it unless it begins with it.
+fn with_name(id: &str, why: &str) -> String {
+    if why.starts_with(id) { why.to_owned() } else { format!("{id}: {why}") }
 }
 
 fn near_runs(near: &[String]) -> String {
@@ -316,24 +321,26 @@ impl Error {
             Self::Refused { remedy, .. } => return remedy.clone(),
             Self::NoSuchPath(_) => "check the spelling; a run is the root file of a family or its folder",
             Self::NoRuns { .. } => "give the folder that holds the runs, or a run's root file (d3plot)",
-            Self::BadRuns { .. } => "mend or remove these runs, or go on without them: --skip-bad",
+            Self::BadRuns { .. } => {
+                "mend or remove these runs, go on without them (--skip-bad), or let changed ones take their place (--replace)"
+            }
             Self::SameId { .. } => "give the folder above both, so that the ids differ",
             Self::NoSurface { .. } => "solids are not read as a surface yet; choose a run with shells",
             Self::UnknownPart { .. } => "name a part by its id or its title, or leave --part out to take all shells",
             Self::OtherMesh { .. } => "a study compares runs on one mesh; make a study of its own for this run",
             Self::NotFinite { .. } | Self::TooLarge { .. } => {
-                "the run broke down there; add it up to an earlier state or leave it out with --skip-bad"
+                "the run broke down there; `add --skip-bad` leaves it out"
             }
             Self::NoCoordinates { .. } => "write coordinates into the result file (*DATABASE_EXTENT_BINARY: IU = 1)",
             Self::NoStates { .. } => {
-                "the run may not have started or been cut; copy it again or leave it out with --skip-bad"
+                "the run may not have started, or may have been cut short; copy it again, or leave it out with `add --skip-bad`"
             }
             Self::Mesh { .. } => "choose another reference run, or parts without the fault, with --part",
             Self::Join(_) => "give a distance in the model's length unit, a little above the gap between the sheets",
             Self::Operator(_) => "choose other parts with --part, or mend the mesh",
             Self::Eigen(_) => "ask for fewer eigenpairs (-K), or report this mesh",
             Self::NotAStudy { .. } => "make one with `crumple init` or `crumple analyze`",
-            Self::StudyExists { .. } => "give another folder, or delete this one",
+            Self::StudyExists { .. } => "give another folder",
             Self::OtherLayout { .. } => "use the version of crumple that wrote it, or make the study again",
             Self::Damaged { .. } => "run `crumple check` on the study; make it again from the runs if files are lost",
             Self::Io { source, .. } => match source.kind() {
@@ -352,14 +359,17 @@ impl Error {
             Self::RunChanged { .. } => "replace it with `crumple add --replace`, or give it another name",
             Self::TooFewRuns { .. } => "add more runs",
             Self::UnknownMode { .. } | Self::NoModes => "`crumple modes STUDY` finds and names them",
-            Self::UnknownDescriptor { .. } => "`crumple describe STUDY RUN` makes one",
+            Self::UnknownDescriptor { .. } => {
+                "`crumple describe STUDY RUN`, or `--mode NAME` for the typical run of a mode, makes one"
+            }
             Self::OtherBasis { .. } | Self::BadDescriptor { .. } => {
                 "make it again in this study with `crumple describe`"
             }
             Self::Threshold { .. } => "rules: std:C  mean:C  value:T  top:M  energy:SHARE  error:MM",
             Self::Table { .. } => "a table is CSV with one header line and one row a run, the run in the first column",
             Self::NoMatch { .. } => "the first column must hold the runs' ids, or their numbers",
-            Self::Stopped | Self::Value { .. } | Self::Internal(_) => return None,
+            Self::Stopped => "repeat the command to go on; runs that were added stay",
+            Self::Value { .. } | Self::Internal(_) => return None,
         };
         Some(text.to_owned())
     }

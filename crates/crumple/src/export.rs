@@ -9,7 +9,7 @@ use crate::Error;
 use crate::descriptor::Descriptor;
 use crate::error::io;
 use crate::modes;
-use crate::study::{Coefficients, Column, Loaded, Rows, add_inputs, column_name, store, write_columns};
+use crate::study::{Coefficients, Column, Loaded, Rows, column_name, run_columns, store, write_columns};
 
 /// Formats of tables.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -63,9 +63,9 @@ pub fn export(loaded: &Loaded, folder: &Path, options: &ExportOptions<'_>) -> Re
         )?,
     ];
     files.push(table(folder, "coefficients", format, &coefficient_columns(&rows))?);
-    files.push(table(folder, "runs", format, &run_columns(loaded))?);
+    files.push(table(folder, "runs", format, &run_columns(loaded.study.manifest()))?);
     match modes::load(&loaded.study) {
-        Ok(modes) => files.push(table(folder, "modes", format, &mode_columns(&modes))?),
+        Ok(modes) => files.push(table(folder, "modes", format, &modes::columns(&modes))?),
         Err(Error::NoModes) => {}
         Err(other) => return Err(other),
     }
@@ -102,39 +102,6 @@ fn coefficient_columns(rows: &Coefficients) -> Vec<(String, Column)> {
         }
     }
     columns
-}
-
-fn run_columns(loaded: &Loaded) -> Vec<(String, Column)> {
-    let manifest = loaded.study.manifest();
-    let runs: Vec<_> = manifest.runs.values().collect();
-    let number = |value: &dyn Fn(&crate::study::RunRecord) -> Option<f64>| {
-        Column::Number(runs.iter().map(|run| value(run)).collect())
-    };
-    let mut columns = vec![
-        ("run".to_owned(), Column::Text(manifest.runs.keys().cloned().map(Some).collect())),
-        ("states".to_owned(), Column::Count(runs.iter().map(|run| run.times.len() as i64).collect())),
-        ("last_time".to_owned(), number(&|run| run.times.last().copied())),
-        ("rms".to_owned(), number(&|run| Some(run.last.rms))),
-        ("max".to_owned(), number(&|run| Some(run.last.max))),
-        ("captured".to_owned(), number(&|run| Some(run.last.captured))),
-        ("rigid_share".to_owned(), number(&|run| Some(run.last.rigid_share))),
-        ("strain_p95".to_owned(), number(&|run| Some(run.last.strain_p95))),
-    ];
-    add_inputs(&mut columns, manifest);
-    columns
-}
-
-fn mode_columns(modes: &modes::Modes) -> Vec<(String, Column)> {
-    let text = |value: &dyn Fn(&modes::Membership) -> &str| {
-        Column::Text(modes.runs.iter().map(|run| Some(value(run).to_owned())).collect())
-    };
-    vec![
-        ("run".to_owned(), text(&|run| &run.run)),
-        ("mode".to_owned(), text(&|run| &run.mode)),
-        ("distance".to_owned(), Column::Number(modes.runs.iter().map(|run| Some(run.distance)).collect())),
-        ("silhouette".to_owned(), Column::Number(modes.runs.iter().map(|run| Some(run.silhouette)).collect())),
-        ("outlier".to_owned(), Column::Flag(modes.runs.iter().map(|run| run.outlier).collect())),
-    ]
 }
 
 fn table(folder: &Path, name: &str, format: Format, columns: &[(String, Column)]) -> Result<PathBuf, Error> {

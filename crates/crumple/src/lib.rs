@@ -15,12 +15,12 @@
 //! | a state that the user names | [`target`] | `run_007@3` | [`target::Target`] |
 //! | deformation modes | [`modes`] | coefficients | [`modes::Modes`] |
 //! | which coefficients are looked at | [`select`] | α or δ | values |
-//! | shape from coefficients | [`reconstruct`] | eigenvectors | errors in mm |
+//! | shape from coefficients | [`reconstruct`] | coefficients | a shape, its errors |
 //! | other methods on the same data | [`rivals`] | displacements | PCA |
 //! | the coefficients that matter | [`descriptor`] | one state | [`descriptor::Descriptor`] |
 //! | how alike | [`similarity`] | a descriptor, coefficients | a ranking |
 //! | judged against labels | [`compare`] | labels | precision, average precision |
-//! | tables and arrays for others | [`export`] | a study | npy, CSV, Parquet |
+//! | tables and arrays for others | [`export`] | a study | npy, CSV, Parquet, OBJ, STL |
 //! | one page for a person | [`report`] | a study | HTML |
 //!
 //! Libraries print nothing: progress and cancellation come in as a [`Watch`], warnings go out as values.

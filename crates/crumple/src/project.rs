@@ -104,7 +104,7 @@ impl<'a> Projector<'a> {
         }
         let placement = reference.place(run)?;
         if placement.offset_max > 1e-3 * geometry.edge_mean {
-            warnings.push(format!("undeformed positions differ from the reference run's by up to {:.3}; displacements count from the reference", placement.offset_max));
+            warnings.push(format!("undeformed positions differ from the reference run's by up to {:.2e}; displacements count from the reference", placement.offset_max));
         }
         let batch = (BATCH_BYTES / (72 * basis.vertices())).clamp(1, 64);
         let mut hash = blake3::Hasher::new();

@@ -16,8 +16,8 @@ use crate::run::Run;
 pub struct Reference {
     /// The triangle mesh, undeformed, in the model's length unit.
     pub mesh: Mesh,
-    /// Index of the shell that each triangle comes from, T.
-    pub face_of_triangle: Vec<u32>,
+    /// Index in the reference run of the shell that each triangle comes from, T.
+    pub shell_of_triangle: Vec<u32>,
     /// User id of each vertex's node, N.
     pub node_ids: Vec<u64>,
     /// Labels of the parts it was taken from.
@@ -44,13 +44,13 @@ impl Reference {
     pub fn of_run(run: &Run, parts: &[String]) -> Result<Self, Error> {
         let all = run.parts();
         let chosen = choose_parts(run, &all, parts)?;
-        let faces: Vec<[u32; 4]> = run
-            .faces()
-            .filter(|(_, part)| chosen.get(*part as usize).copied().unwrap_or(parts.is_empty()))
-            .map(|(face, _)| face)
-            .collect();
+        let is_chosen = |part: u32| chosen.get(part as usize).copied().unwrap_or(parts.is_empty());
         // A face without area has no part in the operator, and a vertex that only such faces use would have no mass.
-        let faces: Vec<[u32; 4]> = faces.into_iter().filter(|face| has_area(run.undeformed(), face)).collect();
+        let (shells, faces): (Vec<u32>, Vec<[u32; 4]>) = (0..)
+            .zip(run.faces())
+            .filter(|(_, (face, part))| is_chosen(*part) && has_area(run.undeformed(), face))
+            .map(|(shell, (face, _))| (shell, face))
+            .unzip();
         if faces.is_empty() {
             return Err(Error::NoSurface { run: run.id().to_owned(), found: run.contents() });
         }
@@ -61,7 +61,8 @@ impl Reference {
             Mesh::from_faces(vertices, &faces).map_err(|source| Error::Mesh { run: run.id().to_owned(), source })?;
         let node_ids = nodes.iter().map(|&node| run.node_ids()[node as usize]).collect();
         let labels = all.iter().zip(&chosen).filter(|(_, chosen)| **chosen).map(|(part, _)| part.label()).collect();
-        Ok(Self { face_of_triangle: mesh.face_of_triangle().to_vec(), mesh, node_ids, parts: labels })
+        let shell_of_triangle = mesh.face_of_triangle().iter().map(|&face| shells[face as usize]).collect();
+        Ok(Self { shell_of_triangle, mesh, node_ids, parts: labels })
     }
 
     /// Number of vertices N.
@@ -134,7 +135,7 @@ impl Reference {
     fn face_keys(&self) -> Vec<FaceKey> {
         let ids_of = |triangle: &[u32; 3]| triangle.map(|vertex| self.node_ids[vertex as usize]);
         let mut keys = Vec::new();
-        let mut triangles = self.mesh.triangles().iter().zip(&self.face_of_triangle).peekable();
+        let mut triangles = self.mesh.triangles().iter().zip(&self.shell_of_triangle).peekable();
         while let Some((triangle, face)) = triangles.next() {
             let [a, b, c] = ids_of(triangle);
             let other_half = triangles.next_if(|(_, next)| *next == face).map(|(triangle, _)| ids_of(triangle));

@@ -1,6 +1,6 @@
 //! A run: one simulation, as its solver wrote it, behind one face whatever the format.
 //!
-//! This is the only module that knows which readers there are. The rest of the method sees node ids, shell faces,
+//! With [`crate::bundle`], which finds result files, this is the only module that knows which readers there are. The rest of the method sees node ids, shell faces,
 //! times and positions.
 
 use std::path::{Path, PathBuf};

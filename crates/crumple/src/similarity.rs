@@ -43,7 +43,7 @@ pub enum Metric {
     /// Cosine of the angle, −1 to 1.
     #[default]
     Cosine,
-    /// M-weighted RMS distance on J, in the length unit; similarity 1 / (1 + distance / the target's own RMS).
+    /// M-weighted RMS distance on J, in the length unit (without unit when weighted); similarity 1 / (1 + distance / the target's own RMS).
     Euclidean,
     /// Distance in units of the study's spread on J, with the covariance shrunk (Ledoit and Wolf 2004), per
     /// coefficient; similarity 1 / (1 + distance).
@@ -124,8 +124,9 @@ impl Comparer {
                 expected: format!("at most {}", basis.eigenpairs()),
             });
         }
-        if let Some(have) = rows.map(Coefficients::rows).filter(|&rows| rows < 2) {
-            return Err(Error::TooFewRuns { what: "centring, spread or Mahalanobis", needed: 2, have });
+        let needed = if metric == Metric::Mahalanobis { 3 } else { 2 };
+        if let Some(have) = rows.map(Coefficients::rows).filter(|&rows| rows < needed) {
+            return Err(Error::TooFewRuns { what: "centring, spread or Mahalanobis", needed, have });
         }
         let offset: Vec<f64> = match descriptor.select {
             Select::Coordinates => j.iter().flat_map(|&j| basis.baseline[j - 1]).collect(),

@@ -30,9 +30,23 @@ pub struct Target {
     pub time: f64,
     /// δ, K × 3.
     pub delta: Vec<[f64; 3]>,
+    /// What was noticed about the run: a cut file, a displacement that is mostly rigid.
+    pub warnings: Vec<String>,
 }
 
 impl Target {
+    /// What makes this state hard to compare with a descriptor's: warnings about its run, and another time.
+    pub fn caveats(&self, descriptor_time: f64) -> Vec<String> {
+        let mut caveats = self.warnings.clone();
+        if (self.time - descriptor_time).abs() > 0.05 * descriptor_time.abs() {
+            caveats.push(format!(
+                "its state is at time {}, the descriptor's at {}",
+                self.time as f32, descriptor_time as f32
+            ));
+        }
+        caveats
+    }
+
     /// δ on the named eigenvectors (counted from 1), 3 numbers each.
     pub fn on(&self, eigenvectors: &[usize]) -> Vec<f32> {
         eigenvectors.iter().flat_map(|&j| self.delta[j - 1]).map(|x| x as f32).collect()
@@ -72,14 +86,15 @@ pub fn resolve(loaded: &Loaded, named: &Named) -> Result<Target, Error> {
         let rows = study.coefficients(None, Rows::Run(&named.run))?;
         let state = state_of(named, rows.rows())?;
         let delta = rows.row(state).as_chunks().0.iter().map(|triple| triple.map(f64::from)).collect();
-        return Ok(Target { run: named.run.clone(), state, time: rows.times[state], delta });
+        let warnings = study.record(&named.run)?.warnings.clone();
+        return Ok(Target { run: named.run.clone(), state, time: rows.times[state], delta, warnings });
     }
     let run = open_outside(study, &named.run)?;
     let projected = project(&run, &loaded.reference, &loaded.basis, &())?;
     let state = state_of(named, projected.states.len())?;
     let found = &projected.states[state];
     let delta = found.delta.as_chunks().0.iter().map(|triple| triple.map(f64::from)).collect();
-    Ok(Target { run: projected.run, state, time: found.time, delta })
+    Ok(Target { run: projected.run, state, time: found.time, delta, warnings: projected.warnings })
 }
 
 /// Positions of a target on the mesh, N × 3, read from its result file.

@@ -8,7 +8,7 @@ use std::path::Path;
 
 use crumple::descriptor::{self, DescribeOptions, Select, Threshold, describe};
 use crumple::modes::{ModesOptions, load, modes, save};
-use crumple::report::findings;
+use crumple::report::{describe_modes, findings};
 use crumple::similarity::{SimilarityOptions, search};
 use crumple::study::{Loaded, Rows, Study, check};
 use crumple::target::Named;
@@ -47,7 +47,7 @@ fn ask(folder: &Path) -> Result<(), crumple::Error> {
     }
     describe(&loaded, &Named::parse("run_2"), None, None, &DescribeOptions::default())?;
     let made = load(&loaded.study)?;
-    findings(&loaded, &made, &DescribeOptions::default(), &())?;
+    findings(&loaded, &made, &describe_modes(&loaded, &made, None, &())?)?;
     Ok(())
 }
 

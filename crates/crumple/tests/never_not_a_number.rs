@@ -7,7 +7,7 @@ mod world;
 
 use crumple::descriptor::{DescribeOptions, Select, Threshold, describe};
 use crumple::modes::{By, Method, ModesOptions, load, modes, save};
-use crumple::report::{findings, page};
+use crumple::report::{describe_modes, findings, page};
 use crumple::similarity::{Metric, SimilarityOptions, Weight, search};
 use crumple::study::{AddOptions, Function, Loaded, Rows, Study, check};
 use crumple::target::Named;
@@ -69,7 +69,8 @@ fn draw_the_page(study: &Study) {
     let loaded = Loaded::open(study.folder()).unwrap();
     let made = load(&loaded.study).unwrap();
     let options = DescribeOptions { threshold: Threshold::Top(1), ..Default::default() };
-    page(&findings(&loaded, &made, &options, &()).unwrap()).unwrap();
+    let described = describe_modes(&loaded, &made, Some(&options), &()).unwrap();
+    page(&findings(&loaded, &made, &described).unwrap()).unwrap();
 }
 
 /// Shells over a few nodes, corners drawn without a plan: repeated nodes, three faces on an edge, loose pieces.

@@ -45,7 +45,7 @@ fn what_is_read_is_what_was_written() {
     assert_eq!(read_reference.mesh.vertices(), reference.mesh.vertices());
     assert_eq!(read_reference.mesh.triangles(), reference.mesh.triangles());
     assert_eq!(read_reference.node_ids, reference.node_ids);
-    assert_eq!(read_reference.face_of_triangle, reference.face_of_triangle);
+    assert_eq!(read_reference.shell_of_triangle, reference.shell_of_triangle);
     assert_eq!(read_reference.parts, reference.parts);
     assert_eq!(read_basis.eigenvalues, basis.eigenvalues);
     assert_eq!(read_basis.eigenvectors, basis.eigenvectors);

@@ -74,7 +74,7 @@ pub(crate) fn tell(study: &Study, added: &Added, output: &Output) {
         match runs_of.get_mut(&without_numbers(warning)).map(std::mem::take).as_deref() {
             None | Some([]) => {}
             Some([_]) => output.note(&format!("{run}: {warning}")),
-            Some(runs) => output.note(&format!("{} runs, {run} the first: {warning}", runs.len())),
+            Some(runs) => output.note(&format!("{} runs have a note like that of {run}: {warning}", runs.len())),
         }
     }
 }

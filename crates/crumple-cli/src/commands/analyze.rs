@@ -7,13 +7,14 @@ use clap::Args;
 use crumple::bundle::{self, Found};
 use crumple::descriptor::{self, Descriptor};
 use crumple::modes;
+use crumple::reference::Reference;
+use crumple::report::{describe_modes, early_words, findings, page};
 use crumple::run::Run;
 use crumple::study::{AddOptions, Loaded, Study};
-use crumple::target::Named;
 use crumple::{Error, Watch};
 use serde_json::json;
 
-use super::{Answer, add, describe, init, report};
+use super::{Answer, add, describe, init};
 use crate::options::{AddArgs, BasisArgs, DescribeArgs, ModesArgs};
 use crate::output::{Output, percent, table};
 
@@ -28,7 +29,8 @@ pub(crate) struct Analyze {
     /// Folder of the study; the page is written into it as report.html
     #[arg(short, long, value_name = "STUDY")]
     output: PathBuf,
-    /// Run whose undeformed shells are the surface, by id or path [default: the first by name]
+    /// Run whose undeformed shells are the surface, by id or path [default: the study's own; for a new study the first
+    /// by name]
     #[arg(long, value_name = "RUN")]
     reference: Option<String>,
     #[command(flatten)]
@@ -53,28 +55,29 @@ impl Analyze {
         }
         let reference = self.reference_run(&found)?;
         seconds.lap("find");
-        let mut study = self.open_or_create(&reference, watch)?;
+        let mut study = self.open_or_create(&reference, found.len(), watch)?;
         seconds.lap("init");
         let options = AddOptions { replace: self.add.replace, skip_bad: self.add.skip_bad, params: table.as_ref() };
         let added = study.add(&found, options, watch)?;
         seconds.lap("add");
+        add::tell(&study, &added, output);
         let modes = modes::modes(&study, &modes_options, watch)?;
-        modes::save(&study, &modes)?;
         seconds.lap("modes");
         let loaded = Loaded::of(study)?;
-        let mut descriptors = Vec::new();
-        for mode in &modes.modes {
-            let named = Named { run: mode.medoid.clone(), state: None };
-            let described =
-                descriptor::describe(&loaded, &named, Some(&mode.name), Some(&mode.name), &describe_options)?;
-            descriptor::save(&loaded.study, &described.descriptor)?;
-            descriptors.push(described.descriptor);
-        }
+        let described = describe_modes(&loaded, &modes, Some(&describe_options), watch)?;
         seconds.lap("describe");
-        let path = crumple::report::save(&loaded.study, &report::make(&loaded, &describe_options, watch)?)?;
+        let page = page(&findings(&loaded, &modes, &described)?)?;
+        // Everything is known before anything is replaced.
+        modes::save(&loaded.study, &modes)?;
+        descriptor::forget_modes(&loaded.study, &modes)?;
+        let descriptors: Vec<Descriptor> = described.into_iter().map(|described| described.descriptor).collect();
+        for descriptor in &descriptors {
+            descriptor::save(&loaded.study, descriptor)?;
+        }
+        let path = crumple::report::save(&loaded.study, &page)?;
         seconds.lap("report");
         init::advise(&loaded.basis, output);
-        add::tell(&loaded.study, &added, output);
+        early_words(&loaded.study).iter().for_each(|words| output.note(words));
         let facts = json!({
             "study": self.output,
             "report": path,
@@ -98,6 +101,12 @@ impl Analyze {
 
     fn reference_run(&self, found: &[Found]) -> Result<Run, Error> {
         let Some(name) = &self.reference else {
+            // A study keeps its reference: a new run that comes first by name does not take its place.
+            if let Ok(study) = Study::open(&self.output)
+                && let Ok(run) = Run::open(&study.settings().reference, &study.settings().reference_path)
+            {
+                return Ok(run);
+            }
             return first_usable(found, self.add.skip_bad);
         };
         if let Some(run) = found.iter().find(|run| run.id == *name) {
@@ -113,11 +122,19 @@ impl Analyze {
         }
     }
 
-    fn open_or_create(&self, reference: &Run, watch: &dyn Watch) -> Result<Study, Error> {
+    fn open_or_create(&self, reference: &Run, runs: usize, watch: &dyn Watch) -> Result<Study, Error> {
         let options = self.basis.options();
+        if runs < modes::RUNS_MIN && !self.output.exists() {
+            // Found out before the eigenbasis is computed, but after what else is wrong with the one run.
+            Reference::of_run(reference, &self.basis.parts)?;
+            return Err(Error::TooFewRuns { what: "grouping into modes", needed: modes::RUNS_MIN, have: runs });
+        }
         match Study::create(&self.output, reference, &self.basis.parts, &options, watch) {
-            Err(Error::StudyExists { folder, .. }) => {
-                let study = Study::open(&folder)?;
+            Err(Error::StudyExists { folder, what }) => {
+                let study = match Study::open(&folder) {
+                    Err(Error::NotAStudy { .. }) => return Err(Error::StudyExists { folder, what }),
+                    other => other?,
+                };
                 if study.is_for(reference, &self.basis.parts, &options)? {
                     return Ok(study);
                 }

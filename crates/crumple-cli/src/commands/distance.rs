@@ -38,7 +38,9 @@ impl Distance {
         let comparer = Comparer::new(&loaded, &descriptor, options)?;
         let target = resolve(&loaded, &Named::in_study(&loaded.study, &self.run))?;
         let score = comparer.score(&target.on(comparer.eigenvectors()));
-        let facts = json!({ "descriptor": descriptor.name, "run": target.run, "state": target.state, "time": target.time, "distance": score.distance, "similarity": score.similarity });
+        let warnings = target.caveats(descriptor.time);
+        warnings.iter().for_each(|warning| output.note(&format!("{}: {warning}", target.run)));
+        let facts = json!({ "descriptor": descriptor.name, "run": target.run, "state": target.state, "time": target.time, "distance": score.distance, "similarity": score.similarity, "warnings": warnings });
         output.print(&facts, || score.distance.to_string());
         Ok(Answer::Done)
     }

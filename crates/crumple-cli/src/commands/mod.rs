@@ -37,13 +37,13 @@ pub(crate) enum Command {
     Info(info::Info),
     /// Make a study: the reference mesh and its eigenbasis
     Init(init::Init),
-    /// Add runs to a study: project every state of theirs
+    /// Add runs to a study: project each of their states
     Add(add::Add),
     /// Find the deformation modes of a study
     Modes(modes::Modes),
     /// Build and save the descriptor of a run or of a mode
     Describe(describe::Describe),
-    /// Find the runs that deform like a descriptor says
+    /// Find the runs that deform as a descriptor says
     Search(search::Search),
     /// Does each run deform as the descriptor says? Exit code 1 if one does not
     Verify(verify::Verify),

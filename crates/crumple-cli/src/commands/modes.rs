@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use crumple::descriptor::forget_modes;
 use crumple::modes::{self, Modes as Found};
+use crumple::report::early_words;
 use crumple::study::Study;
 use crumple::{Error, Watch};
 use serde_json::{Value, json};
@@ -29,6 +31,8 @@ impl Modes {
         let study = Study::open(&self.study)?;
         let found = modes::modes(&study, &options, watch)?;
         modes::save(&study, &found)?;
+        forget_modes(&study, &found)?;
+        early_words(&study).iter().for_each(|words| output.note(words));
         output.print(&facts(&found), || words(&found, &study.settings().length_unit));
         Ok(Answer::Done)
     }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use crumple::Error;
-use crumple::descriptor::{self, Select};
+use crumple::descriptor;
 use crumple::export::{write_obj, write_stl};
 use crumple::reconstruct::{errors, reconstruct};
 use crumple::rivals::Pca;
@@ -13,6 +13,7 @@ use crumple::target::{self, Named, resolve};
 use serde_json::json;
 
 use super::Answer;
+use crate::options::select;
 use crate::output::{Output, percent};
 
 #[derive(Args)]
@@ -31,6 +32,10 @@ pub(crate) struct Reconstruct {
     /// From the M eigenvectors of lowest frequency [default: all of them]
     #[arg(long, value_name = "M", allow_negative_numbers = true, group = "method")]
     first: Option<usize>,
+    /// What --first rebuilds: the `coordinates` from their own coefficients, or the `difference` added to the undeformed
+    /// part [default: coordinates]
+    #[arg(long, value_name = "WHAT", conflicts_with_all = ["descriptor", "pca"])]
+    select: Option<String>,
     /// From M principal components of the displacements of all runs
     #[arg(long, value_name = "M", allow_negative_numbers = true, group = "method")]
     pca: Option<usize>,
@@ -80,7 +85,9 @@ impl Reconstruct {
             });
         }
         let first: Vec<usize> = (1..=count).collect();
-        Ok(("first eigenvectors".into(), count, reconstruct(reference, basis, Select::Difference, &first, delta)))
+        let select = select(self.select.as_deref())?;
+        let method = format!("first eigenvectors ({})", select.word());
+        Ok((method, count, reconstruct(reference, basis, select, &first, delta)))
     }
 
     fn write(&self, loaded: &Loaded, shape: &[[f64; 3]], original: &[[f64; 3]]) -> Result<(), Error> {

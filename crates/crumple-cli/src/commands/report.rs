@@ -3,10 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use crumple::descriptor::DescribeOptions;
-use crumple::modes::{self, ModesOptions};
-use crumple::report::{findings, page};
-use crumple::study::Loaded;
+use crumple::modes::{self, Modes, ModesOptions};
+use crumple::report::{describe_modes, findings, page};
+use crumple::study::{Loaded, Study};
 use crumple::{Error, Watch};
 use serde_json::json;
 
@@ -16,7 +15,7 @@ use crate::output::Output;
 
 #[derive(Args)]
 #[command(
-    after_help = "The page needs no network; open it in any browser.\n\nExample:\n  crumple report study -o study.html"
+    after_help = "The page needs no network; open it in any browser. Without --select and --threshold a mode is described as its saved descriptor was.\n\nExample:\n  crumple report study -o study.html"
 )]
 pub(crate) struct Report {
     /// Folder of the study
@@ -30,9 +29,11 @@ pub(crate) struct Report {
 
 impl Report {
     pub(crate) fn run(&self, output: &Output, watch: &dyn Watch) -> Result<Answer, Error> {
-        let options = self.describe.options()?;
+        let asked = self.describe.asked()?;
         let loaded = Loaded::open(&self.study)?;
-        let page = make(&loaded, &options, watch)?;
+        let modes = modes_of(&loaded.study, watch)?;
+        let described = describe_modes(&loaded, &modes, asked.as_ref(), watch)?;
+        let page = page(&findings(&loaded, &modes, &described)?)?;
         crumple::report::write(&self.output, &page)?;
         let bytes = page.len();
         output.print(&json!({ "file": self.output, "bytes": bytes }), || {
@@ -42,15 +43,14 @@ impl Report {
     }
 }
 
-/// The page; finds the modes first where the study has none.
-pub(crate) fn make(loaded: &Loaded, options: &DescribeOptions, watch: &dyn Watch) -> Result<String, Error> {
-    let modes = match modes::load(&loaded.study) {
+/// The modes of a study; found and saved first where it has none.
+fn modes_of(study: &Study, watch: &dyn Watch) -> Result<Modes, Error> {
+    match modes::load(study) {
         Err(Error::NoModes) => {
-            let found = modes::modes(&loaded.study, &ModesOptions::default(), watch)?;
-            modes::save(&loaded.study, &found)?;
-            found
+            let found = modes::modes(study, &ModesOptions::default(), watch)?;
+            modes::save(study, &found)?;
+            Ok(found)
         }
-        other => other?,
-    };
-    page(&findings(loaded, &modes, options, watch)?)
+        other => other,
+    }
 }

@@ -14,7 +14,7 @@ use crate::options::{SimilarityArgs, rows};
 use crate::output::{Output, table, time};
 
 #[derive(Args)]
-#[command(after_help = "Example:\n  crumple search study mode-1 --top 9")]
+#[command(after_help = "Example:\n  crumple search study mode-1 --top 10")]
 pub(crate) struct Search {
     /// Folder of the study
     study: PathBuf,
@@ -45,11 +45,15 @@ impl Search {
                     hit.run.clone(),
                     hit.state.to_string(),
                     time(hit.time),
-                    format!("{:.4}", hit.score.similarity),
+                    format!("{:.6}", hit.score.similarity),
+                    format!("{:.6}", hit.score.distance),
                 ]
             });
             let what = if rows == Rows::Last { "runs" } else { "states" };
-            format!("{}\n{searched} {what} searched", table(&["#", "run", "#state", "#time", "#similarity"], cells))
+            format!(
+                "{}\n{searched} {what} searched",
+                table(&["#", "run", "#state", "#time", "#similarity", "#distance"], cells)
+            )
         });
         Ok(Answer::Done)
     }

@@ -5,19 +5,20 @@ use std::path::PathBuf;
 use clap::Args;
 use crumple::Error;
 use crumple::descriptor;
-use crumple::similarity::Comparer;
+use crumple::similarity::{Comparer, Score};
 use crumple::study::Loaded;
 use crumple::target::{Named, resolve};
+use serde::Serialize;
 use serde_json::json;
 
 use super::Answer;
 use crate::options::SimilarityArgs;
-use crate::output::{Output, table};
+use crate::output::{Output, table, time};
 
 #[derive(Args)]
 #[command(
     about = "Does each run deform as the descriptor says? Exit code 1 if one does not",
-    after_help = "Exit code: 0 all pass, 1 some fail, 2 bad input.\n\nExample:\n  crumple verify study mode-1 run_003 run_042 --threshold 0.92\n  crumple verify study mode-1 new/d3plot --threshold 0.92"
+    after_help = "Exit code: 0 all pass, 1 some fail, 2 bad input.\n\nExample:\n  crumple verify study mode-1 run_003 run_042 --threshold 0.97\n  crumple verify study mode-1 new/d3plot --threshold 0.97"
 )]
 pub(crate) struct Verify {
     /// Folder of the study
@@ -27,7 +28,8 @@ pub(crate) struct Verify {
     /// Runs: ids of the study, or paths of new result files, which are not added; @N for a state
     #[arg(required = true, value_name = "RUN")]
     runs: Vec<String>,
-    /// Smallest similarity that passes, -1 to 1. Take it from `crumple search`: between the worst run you like and the
+    /// Smallest similarity that passes, -1 to 1, under the same options as `crumple search`. Take it from
+    /// there: between the worst run you like and the
     /// best you do not
     #[arg(long, value_name = "S", default_value_t = 0.9, allow_negative_numbers = true)]
     threshold: f64,
@@ -50,25 +52,44 @@ impl Verify {
         let comparer = Comparer::new(&loaded, &descriptor, options)?;
         let judge = |run: &String| {
             let target = resolve(&loaded, &Named::in_study(&loaded.study, run))?;
-            Ok((target.run.clone(), target.state, comparer.score(&target.on(comparer.eigenvectors())).similarity))
+            let score = comparer.score(&target.on(comparer.eigenvectors()));
+            let warnings = target.caveats(descriptor.time);
+            let pass = score.similarity >= self.threshold;
+            Ok(Judged { run: target.run, state: target.state, time: target.time, score, pass, warnings })
         };
-        let judged: Vec<(String, usize, f64)> = self.runs.iter().map(judge).collect::<Result<_, Error>>()?;
-        let passes = |similarity: f64| similarity >= self.threshold;
-        let results: Vec<_> = judged.iter().map(|(run, state, similarity)| json!({ "run": run, "state": state, "similarity": similarity, "pass": passes(*similarity) })).collect();
+        let results: Vec<Judged> = self.runs.iter().map(judge).collect::<Result<_, Error>>()?;
+        for judged in &results {
+            judged.warnings.iter().for_each(|warning| output.note(&format!("{}: {warning}", judged.run)));
+        }
+        let all = results.iter().all(|judged| judged.pass);
         output.print(
             &json!({ "descriptor": descriptor.name, "threshold": self.threshold, "results": results }),
             || {
-                let cells = judged.iter().map(|(run, state, similarity)| {
+                let cells = results.iter().map(|judged| {
+                    let verdict = if judged.pass { "pass" } else { "FAIL" };
                     vec![
-                        run.clone(),
-                        state.to_string(),
-                        format!("{similarity:.4}"),
-                        if passes(*similarity) { "pass" } else { "FAIL" }.to_owned(),
+                        judged.run.clone(),
+                        judged.state.to_string(),
+                        time(judged.time),
+                        format!("{:.6}", judged.score.similarity),
+                        verdict.to_owned(),
                     ]
                 });
-                table(&["run", "#state", "#similarity", "verdict"], cells)
+                table(&["run", "#state", "#time", "#similarity", "verdict"], cells)
             },
         );
-        Ok(if judged.iter().all(|(_, _, similarity)| passes(*similarity)) { Answer::Done } else { Answer::No })
+        Ok(if all { Answer::Done } else { Answer::No })
     }
+}
+
+/// A run and the verdict on it.
+#[derive(Serialize)]
+struct Judged {
+    run: String,
+    state: usize,
+    time: f64,
+    #[serde(flatten)]
+    score: Score,
+    pass: bool,
+    warnings: Vec<String>,
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::Descriptor;
 use crate::Error;
 use crate::error::io;
+use crate::modes::Modes;
 use crate::study::{DESCRIPTORS, Study, store};
 
 /// Saves a descriptor in its study; one of the same name is replaced.
@@ -66,6 +67,24 @@ fn read(path: &Path, study: &Study) -> Result<Descriptor, Error> {
         return Err(unusable("a value is not a number".into()));
     }
     Ok(descriptor)
+}
+
+/// Removes descriptors that were made for a mode which is gone or has another typical run now: a search by the name of
+/// a mode must not rank by what the name meant before.
+///
+/// # Errors
+/// [`Error::Io`].
+pub fn forget_modes(study: &Study, modes: &Modes) -> Result<(), Error> {
+    let _writing = study.writing()?;
+    for name in list(study)? {
+        let Ok(saved) = load(study, &name) else { continue };
+        let holds = modes.modes.iter().any(|mode| mode.name == name && mode.medoid == saved.run);
+        if saved.mode.as_deref() == Some(name.as_str()) && !holds {
+            let path = study.folder().join(DESCRIPTORS).join(format!("{name}.json"));
+            std::fs::remove_file(&path).map_err(io("remove", &path))?;
+        }
+    }
+    Ok(())
 }
 
 /// Names of the study's descriptors, sorted.

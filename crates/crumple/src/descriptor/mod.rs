@@ -7,7 +7,7 @@ mod threshold;
 
 use serde::{Deserialize, Serialize};
 
-pub use file::{list, load, save};
+pub use file::{forget_modes, list, load, save};
 pub use threshold::{Selection, Threshold};
 
 use crate::Error;
@@ -49,7 +49,8 @@ pub struct Descriptor {
     pub split_clusters: Vec<(usize, usize)>,
     /// Errors of the reconstruction.
     pub errors: Errors,
-    /// The same for other methods of equal size.
+    /// The same for the first M eigenvectors, the first K, and M principal components (M numbers, where M eigenvectors
+    /// are 3M).
     pub rivals: Vec<Rival>,
 }
 
@@ -194,7 +195,9 @@ fn pca_rival(loaded: &Loaded, target: &Target, original: &[[f64; 3]], components
 
 /// Ranges of nearly equal eigenvalues of which J holds some but not all.
 fn split_clusters(basis: &Basis, eigenvectors: &[usize]) -> Vec<(usize, usize)> {
-    let ranges = basis.facts.clusters.iter().chain(&basis.facts.close);
+    // The null space is one vector a piece, in closed form, and always rebuilt: nothing in it is arbitrary.
+    let ranges =
+        basis.facts.clusters.iter().chain(&basis.facts.close).filter(|(_, last)| *last > basis.facts.null_space);
     let mut split: Vec<(usize, usize)> = ranges
         .copied()
         .filter(|&(first, last)| {

@@ -63,7 +63,7 @@ impl Threshold {
 
     /// Applies the rule to the coefficients of one state, K × 3.
     ///
-    /// `rms_without(order, m)` gives the RMS error of a reconstruction from the first m eigenvectors of `order`;
+    /// `rms_with_first(order, m)` gives the RMS error of a reconstruction from the first m eigenvectors of `order`;
     /// it is asked only by [`Threshold::Error`].
     ///
     /// # Errors
@@ -71,7 +71,7 @@ impl Threshold {
     pub fn select(
         &self,
         values: &[[f64; 3]],
-        rms_without: impl Fn(&[usize], usize) -> f64,
+        rms_with_first: impl Fn(&[usize], usize) -> f64,
     ) -> Result<Selection, Error> {
         self.checked()?;
         let largest: Vec<f64> =
@@ -123,12 +123,12 @@ impl Threshold {
             }
             Self::Error(wanted) => {
                 // The error falls as m grows: bisection.
-                let reached = |m: usize| rms_without(&order, m) <= wanted;
+                let reached = |m: usize| rms_with_first(&order, m) <= wanted;
                 if !reached(values.len()) {
                     return Err(fail(format!(
                         "all {} eigenvectors leave an error of {:.4}",
                         values.len(),
-                        rms_without(&order, values.len())
+                        rms_with_first(&order, values.len())
                     )));
                 }
                 let (mut low, mut high) = (0, values.len());
@@ -146,9 +146,9 @@ impl Threshold {
     /// The rule in words, for a page.
     pub fn words(&self) -> String {
         match self {
-            Self::Std(c) if *c == 1.0 => "mean + 1 standard deviation".into(),
-            Self::Std(c) => format!("mean + {c} standard deviations"),
-            Self::Mean(c) => format!("{c} times the mean"),
+            Self::Std(c) if *c == 1.0 => "mean + 1 standard deviation of all".into(),
+            Self::Std(c) => format!("mean + {c} standard deviations of all"),
+            Self::Mean(c) => format!("{c} times the mean of all"),
             Self::Value(_) => "a given value".into(),
             Self::Top(m) => format!("the {m} largest"),
             Self::Energy(share) => format!("{:.3} % of the squared coefficients", 100.0 * share),

@@ -12,21 +12,25 @@ const KEY: &str = "crumple.modes";
 /// # Errors
 /// [`Error::Io`].
 pub fn save(study: &Study, modes: &Modes) -> Result<(), Error> {
+    let whole = serde_json::to_string(modes).map_err(|error| Error::Internal(error.to_string()))?;
+    let _writing = study.writing()?;
+    write_columns(&study.folder().join(FILE), &columns(modes), Some((KEY, whole)))
+}
+
+/// The membership of each run as a table.
+pub(crate) fn columns(modes: &Modes) -> Vec<(String, Column)> {
     let medoid = |run: &str| modes.modes.iter().any(|mode| mode.medoid == run);
     let texts = |text: &dyn Fn(&super::Membership) -> &str| {
         Column::Text(modes.runs.iter().map(|run| Some(text(run).to_owned())).collect())
     };
-    let columns = [
+    vec![
         ("run".to_owned(), texts(&|run| &run.run)),
         ("mode".to_owned(), texts(&|run| &run.mode)),
         ("medoid".to_owned(), Column::Flag(modes.runs.iter().map(|run| medoid(&run.run)).collect())),
         ("distance".to_owned(), Column::Number(modes.runs.iter().map(|run| Some(run.distance)).collect())),
         ("silhouette".to_owned(), Column::Number(modes.runs.iter().map(|run| Some(run.silhouette)).collect())),
         ("outlier".to_owned(), Column::Flag(modes.runs.iter().map(|run| run.outlier).collect())),
-    ];
-    let whole = serde_json::to_string(modes).map_err(|error| Error::Internal(error.to_string()))?;
-    let _writing = study.writing()?;
-    write_columns(&study.folder().join(FILE), &columns, Some((KEY, whole)))
+    ]
 }
 
 /// Reads the modes of a study.

@@ -18,6 +18,7 @@ use serde::{Deserialize, Serialize};
 
 pub use evidence::adjusted_rand_index;
 pub(crate) use evidence::silhouettes;
+pub(crate) use file::columns;
 pub use file::{load, save};
 pub(crate) use points::{Distances, Points, square_distance};
 
@@ -68,6 +69,9 @@ pub enum Method {
     /// Agglomerative, smallest mean distance.
     Average,
 }
+
+/// Fewer runs than this are not grouped.
+pub const RUNS_MIN: usize = 3;
 
 /// The largest number of modes that is tried when none is given.
 pub const COUNT_MAX: usize = 8;
@@ -144,8 +148,8 @@ pub fn modes(study: &Study, options: &ModesOptions, watch: &dyn Watch) -> Result
     };
     let rows = study.coefficients_of(function, None, Rows::Last)?;
     let runs = rows.rows();
-    if runs < 3 {
-        return Err(Error::TooFewRuns { what: "grouping into modes", needed: 3, have: runs });
+    if runs < RUNS_MIN {
+        return Err(Error::TooFewRuns { what: "grouping into modes", needed: RUNS_MIN, have: runs });
     }
     if let Some(count) = count.filter(|&count| count == 0 || count > runs) {
         return Err(Error::Value {

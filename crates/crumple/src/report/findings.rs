@@ -54,7 +54,8 @@ struct StudyFacts {
     orthogonality: f64,
     complete: bool,
     states: usize,
-    captured: f64,
+    /// Of the run of which the eigenvectors catch least.
+    captured_min: f64,
     isometry: Option<String>,
 }
 
@@ -126,48 +127,60 @@ impl Findings {
     }
 }
 
-/// Points of the cloud at the most.
+/// At most about this many points in the cloud, and the last state of every run.
 const POINTS_MAX: usize = 20_000;
 
 /// Name of a mode, and the similarity of each run to its descriptor, runs in the order of the manifest.
 type Similarities = (String, Vec<(String, f64)>);
 
-/// Gathers the findings of a study whose modes are known. A mode's descriptor is made as the saved descriptor of its
-/// name was, or by `options` where there is none.
+/// Describes the medoid of every mode. Without `asked`, a mode is described as the saved descriptor of its name was, or
+/// by the defaults where there is none.
 ///
 /// # Errors
-/// Those of [`describe`], [`Error::Stopped`], reading errors.
-pub fn findings(
+/// Those of [`describe`], [`Error::Stopped`].
+pub fn describe_modes(
     loaded: &Loaded,
     modes: &Modes,
-    options: &DescribeOptions,
+    asked: Option<&DescribeOptions>,
     watch: &dyn Watch,
-) -> Result<Findings, Error> {
+) -> Result<Vec<Described>, Error> {
     let done = AtomicUsize::new(0);
     let describe_mode = |mode: &Mode| {
         if watch.stopped() {
             return Err(Error::Stopped);
         }
         let named = Named { run: mode.medoid.clone(), state: None };
-        let described =
-            describe(loaded, &named, Some(&mode.name), Some(&mode.name), &options_of(loaded, mode, options))?;
+        let options = asked.cloned().or_else(|| as_saved(loaded, mode)).unwrap_or_default();
+        let described = describe(loaded, &named, Some(&mode.name), Some(&mode.name), &options)?;
         watch.step("describing modes", done.fetch_add(1, Ordering::Relaxed) + 1, modes.modes.len());
         Ok(described)
     };
-    let described: Vec<Described> = modes.modes.par_iter().map(describe_mode).collect::<Result<_, Error>>()?;
+    modes.modes.par_iter().map(describe_mode).collect()
+}
+
+fn as_saved(loaded: &Loaded, mode: &Mode) -> Option<DescribeOptions> {
+    let saved = descriptor::load(&loaded.study, &mode.name).ok().filter(|saved| saved.run == mode.medoid)?;
+    Some(DescribeOptions { select: saved.select, threshold: saved.rule.parse().ok()? })
+}
+
+/// Gathers the findings of a study from its modes and the description of each.
+///
+/// # Errors
+/// Reading errors.
+pub fn findings(loaded: &Loaded, modes: &Modes, described: &[Described]) -> Result<Findings, Error> {
     let study = &loaded.study;
     let manifest = study.manifest();
     let cloud = (loaded.basis.facts.null_space + 1).min(loaded.basis.eigenpairs());
-    let similarity = similarities(loaded, &described)?;
+    let similarity = similarities(loaded, described)?;
     let runs = run_data(loaded, modes, cloud, &similarity)?;
     let range =
         described.iter().flat_map(|d| z_displacement(loaded, &d.original)).fold(0.0, |most: f64, z| most.max(z.abs()));
     let range = plain(range);
-    let (mesh, shapes) = shapes(loaded, modes, &described, range)?;
+    let (mesh, shapes) = shapes(loaded, modes, described, range)?;
     let modes_data = modes
         .modes
         .par_iter()
-        .zip(&described)
+        .zip(described)
         .enumerate()
         .map(|(color, (mode, described))| mode_data(loaded, mode, described, color, range, &similarity))
         .collect();
@@ -180,13 +193,18 @@ pub fn findings(
             .map_or_else(|| "study".into(), |name| name.to_string_lossy().into_owned()),
         version: env!("CARGO_PKG_VERSION"),
         study: study_facts(loaded),
-        warnings: warnings(loaded),
+        warnings: warnings(loaded, modes),
         mesh,
         shapes,
         cloud: Cloud {
             eigenvector: cloud,
             eigenvalue: loaded.basis.eigenvalues[cloud - 1],
-            label: "the first that is not constant".to_owned(),
+            label: if cloud > loaded.basis.facts.null_space {
+                "the first that is not constant"
+            } else {
+                "constant on each piece"
+            }
+            .to_owned(),
         },
         inputs: manifest.inputs.clone(),
         runs,
@@ -195,13 +213,6 @@ pub fn findings(
         count_chosen_by: if modes.given { "given" } else { "silhouette" },
         alike_by: modes.by,
     })
-}
-
-fn options_of(loaded: &Loaded, mode: &Mode, options: &DescribeOptions) -> DescribeOptions {
-    let saved = descriptor::load(&loaded.study, &mode.name).ok().filter(|saved| saved.run == mode.medoid);
-    let as_saved =
-        saved.and_then(|saved| Some(DescribeOptions { select: saved.select, threshold: saved.rule.parse().ok()? }));
-    as_saved.unwrap_or_else(|| options.clone())
 }
 
 fn study_facts(loaded: &Loaded) -> StudyFacts {
@@ -225,7 +236,7 @@ fn study_facts(loaded: &Loaded) -> StudyFacts {
         orthogonality: facts.orthogonality,
         complete: facts.complete,
         states: records.iter().map(|run| run.times.len()).sum(),
-        captured: records.iter().map(|run| run.last.captured).fold(1.0, f64::min),
+        captured_min: records.iter().map(|run| run.last.captured).fold(1.0, f64::min),
         isometry: isometry_words(&records),
     }
 }
@@ -302,7 +313,13 @@ fn mode_data(
 ) -> ModeData {
     let descriptor = &described.descriptor;
     let values = z_displacement(loaded, &described.original);
-    let png = picture(&described.original, loaded.reference.mesh.triangles(), &values, range, &View::default());
+    let png = picture(
+        &described.original,
+        loaded.reference.mesh.triangles(),
+        &values,
+        range,
+        &View::of(loaded.reference.mesh.vertices()),
+    );
     let mut nearest: Vec<Nearest> = similarity
         .iter()
         .filter(|(name, _)| *name == mode.name)

@@ -10,5 +10,6 @@ mod shapes;
 mod thin;
 mod words;
 
-pub use findings::{Findings, findings};
+pub use findings::{Findings, describe_modes, findings};
 pub use page::{page, save, write};
+pub use words::early_words;

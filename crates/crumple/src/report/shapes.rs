@@ -92,7 +92,13 @@ fn last_shape(loaded: &Loaded, row: usize) -> Result<Vec<[f64; 3]>, Error> {
     let delta: Vec<[f64; 3]> =
         rows.row(row).as_chunks().0.iter().map(|triple: &[f32; 3]| triple.map(f64::from)).collect();
     let run = rows.runs[row].clone();
-    let target = Target { run: run.clone(), state: rows.states[row] as usize, time: rows.times[row], delta };
+    let target = Target {
+        run: run.clone(),
+        state: rows.states[row] as usize,
+        time: rows.times[row],
+        delta,
+        warnings: Vec::new(),
+    };
     let from_file = target::shape(loaded, &Named { run, state: None }, &target);
     Ok(from_file.unwrap_or_else(|_| {
         let all: Vec<usize> = (1..=loaded.basis.eigenpairs()).collect();

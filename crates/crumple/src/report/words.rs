@@ -1,12 +1,15 @@
 //! What the page says in sentences.
 
+use std::cmp::Ordering;
+
 use super::shapes::z_displacement;
-use crate::study::{Loaded, RunRecord};
+use crate::modes::Modes;
+use crate::study::{Loaded, RunRecord, Study};
 
 /// In words: the mesh is several pieces, what that does, and what helps.
 pub(super) fn join_words(components: usize, distance: f64, unit: &str) -> String {
     format!(
-        "the mesh is {components} pieces that share no nodes, a small distance apart; each has a spectrum of its own, equal pieces bring nearly equal eigenvalues in pairs. \
+        "the mesh is {components} pieces that share no nodes, a small distance apart; each has a spectrum of its own, and equal pieces bring nearly equal eigenvalues in pairs. \
          To treat them as one part: --join {distance} ({unit})"
     )
 }
@@ -16,18 +19,19 @@ pub(super) fn isometry_words(records: &[&RunRecord]) -> Option<String> {
     let mut strains: Vec<f64> = records.iter().map(|run| run.last.strain_p95).collect();
     strains.sort_by(f64::total_cmp);
     let median = *strains.get(strains.len() / 2)?;
-    let thin = if median > 0.1 {
+    let caveat = if median > 0.1 {
         "; the method assumes that the surface hardly stretches, and here it does in places, so compare shapes, not small differences"
     } else {
         ""
     };
     Some(format!(
-        "in the last state of a typical run, 95 % of the edges change their length by less than {:.1} %{thin}",
+        "in the last state of a typical run, 95 % of the edges change their length by less than {:.1} %{caveat}",
         100.0 * median
     ))
 }
 
-pub(super) fn warnings(loaded: &Loaded) -> Vec<String> {
+/// What the user should know before reading the page.
+pub(super) fn warnings(loaded: &Loaded, modes: &Modes) -> Vec<String> {
     let facts = &loaded.basis.facts;
     let mut warnings = Vec::new();
     if facts.non_manifold_edges > 0 {
@@ -39,7 +43,25 @@ pub(super) fn warnings(loaded: &Loaded) -> Vec<String> {
     if facts.flat_triangles > 0 {
         warnings.push(format!("{} triangles without area are left out of the operator", facts.flat_triangles));
     }
+    warnings.extend(early_words(&loaded.study));
+    let ungrouped = loaded.study.manifest().runs.len().saturating_sub(modes.runs.len());
+    if ungrouped > 0 {
+        warnings.push(format!("{ungrouped} runs were added after the modes were found; `crumple modes` groups them"));
+    }
     warnings
+}
+
+/// Which runs end before the others, in words.
+pub fn early_words(study: &Study) -> Option<String> {
+    let early = study.ends_early();
+    let (first, time) = early.first()?;
+    let unit = &study.settings().time_unit;
+    Some(format!(
+        "{} of {} runs end well before the others ({first} at {} {unit} the first); they are grouped and ranked by the state they reached",
+        early.len(),
+        study.manifest().runs.len(),
+        *time as f32
+    ))
 }
 
 /// What the medoid did, in numbers that an engineer reads off a picture: the change along its longest axis, and how
@@ -57,11 +79,25 @@ pub(super) fn mode_words(loaded: &Loaded, shape: &[[f64; 3]]) -> String {
         .into_iter()
         .fold((0.0_f64, 0.0_f64), |(rise, fall), z| (rise.max(z), fall.min(z)));
     format!(
-        "{} from {:.0} to {:.0} {unit} along {}; rises by up to {rise:.0} {unit}, falls by up to {:.0} {unit} (z)",
-        if extent(shape, axis) < extent(before, axis) { "shortens" } else { "grows" },
-        extent(before, axis),
-        extent(shape, axis),
+        "{} from {} to {} {unit} along {}; rises by up to {} {unit}, falls by up to {} {unit} (z)",
+        match extent(shape, axis).total_cmp(&extent(before, axis)) {
+            Ordering::Less => "shortens",
+            Ordering::Equal => "stays",
+            Ordering::Greater => "grows",
+        },
+        three_digits(extent(before, axis)),
+        three_digits(extent(shape, axis)),
         ['x', 'y', 'z'][axis],
-        -fall
+        three_digits(rise),
+        three_digits(fall.abs())
     )
+}
+
+/// A length with three significant digits, whatever its unit.
+fn three_digits(length: f64) -> String {
+    if length == 0.0 {
+        return "0".into();
+    }
+    let decimals = (2.0 - length.abs().log10().floor()).max(0.0) as usize;
+    format!("{length:.decimals$}")
 }

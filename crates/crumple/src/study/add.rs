@@ -89,6 +89,7 @@ impl Study {
             result.skipped.extend(written.failures);
             waiting.extend(written.records);
             if written.stopped {
+                // What is finished is kept, also beside a bad run: that one is found again when the add is repeated.
                 self.commit(waiting, &inputs, options.replace, &mut result)?;
                 return Err(Error::Stopped);
             }

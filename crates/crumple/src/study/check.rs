@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::store::Lock;
-use super::{Error, FileRecord, LOCK, Manifest, Rows, Study, coefficients, tables};
+use super::{Error, FileRecord, LOCK, Loaded, Manifest, Rows, Study, coefficients, tables};
 
 /// What a check found.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
@@ -76,12 +76,8 @@ pub fn check(folder: &Path) -> Result<Checkup, Error> {
 fn contradictions(folder: &Path, manifest: &Manifest) -> Vec<String> {
     let attempt = || -> Result<Vec<String>, Error> {
         let mut problems = Vec::new();
-        let study = Study::open(folder)?;
-        let (reference, basis) = (study.reference()?, study.basis()?);
-        if reference.vertices() != basis.vertices() {
-            problems.push(format!("mesh.vtu has {} vertices, the basis {}", reference.vertices(), basis.vertices()));
-        }
-        let rows = study.coefficients(Some(&[1]), Rows::All)?;
+        let loaded = Loaded::of(Study::open(folder)?)?;
+        let rows = loaded.study.coefficients(Some(&[1]), Rows::All)?;
         let mut states = std::collections::BTreeMap::<&str, usize>::new();
         for run in &rows.runs {
             *states.entry(run).or_default() += 1;

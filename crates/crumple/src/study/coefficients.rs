@@ -54,7 +54,7 @@ pub struct Coefficients {
     pub states: Vec<u32>,
     /// Time of each row.
     pub times: Vec<f64>,
-    /// δ, rows × 3|eigenvectors|, row-major: x, y, z of the first eigenvector, then of the next.
+    /// δ or ρ, as `function` says, rows × 3|eigenvectors|, row-major: x, y, z of the first eigenvector, then of the next.
     pub values: Vec<f32>,
 }
 
@@ -64,7 +64,7 @@ impl Coefficients {
         self.runs.len()
     }
 
-    /// δ of one row, 3 |eigenvectors| numbers.
+    /// One row, 3 |eigenvectors| numbers.
     pub fn row(&self, row: usize) -> &[f32] {
         let width = 3 * self.eigenvectors.len();
         &self.values[row * width..(row + 1) * width]

@@ -37,7 +37,7 @@ pub(crate) fn write(reference: &Reference, path: &Path) -> Result<(), Error> {
         name: "face",
         kind: "Int32",
         components: 1,
-        bytes: reference.face_of_triangle.iter().flat_map(|&face| (face as i32).to_le_bytes()).collect(),
+        bytes: reference.shell_of_triangle.iter().flat_map(|&face| (face as i32).to_le_bytes()).collect(),
     };
     write_vtu(path, reference.mesh.vertices(), reference.mesh.triangles(), vec![node_ids], vec![faces])
 }
@@ -152,5 +152,5 @@ pub(crate) fn read(path: &Path, parts: Vec<String>) -> Result<Reference, Error> 
         return Err(damaged("sizes of its arrays do not fit together"));
     }
     let mesh = Mesh::new(vertices, triangles).map_err(|error| damaged(&error.to_string()))?;
-    Ok(Reference { mesh, face_of_triangle: faces, node_ids, parts })
+    Ok(Reference { mesh, shell_of_triangle: faces, node_ids, parts })
 }

@@ -40,8 +40,7 @@ pub use coefficients::{Coefficients, Function, column_name};
 pub use loaded::Loaded;
 pub use manifest::{FileRecord, LAYOUT, Manifest, RunRecord};
 pub use mesh_file::write_shape;
-pub use tables::write_columns;
-pub(crate) use tables::{Column, add_inputs, metadata_of};
+pub(crate) use tables::{Column, metadata_of, run_columns, write_columns};
 
 use staged::StagedFolder;
 
@@ -197,7 +196,10 @@ impl Study {
         &self.manifest
     }
 
-    /// Whether the study answers to these wishes: the same reference file, parts, eigenpairs and join.
+    /// Whether the study is what these wishes would make: the same surface, parts, eigenpairs and join.
+    ///
+    /// # Errors
+    /// Those of [`Reference::of_run`] and [`Study::reference`].
     pub fn is_for(&self, run: &Run, parts: &[String], options: &BasisOptions) -> Result<bool, Error> {
         let reference = Reference::of_run(run, parts)?;
         let same_mesh = || -> Result<bool, Error> {
@@ -314,6 +316,17 @@ impl Study {
                 near: self.manifest.runs.keys().filter(like).take(5).cloned().collect(),
             }
         })
+    }
+
+    /// Runs that end well before the others (at less than nine tenths of the median last time), with that time: they are
+    /// grouped and ranked by the state they reached.
+    pub fn ends_early(&self) -> Vec<(&str, f64)> {
+        let last = |run: &RunRecord| run.times.last().copied().unwrap_or(0.0);
+        let mut times: Vec<f64> = self.manifest.runs.values().map(last).collect();
+        times.sort_by(f64::total_cmp);
+        let median = times.get(times.len() / 2).copied().unwrap_or(0.0);
+        let runs = self.manifest.runs.iter().map(|(id, run)| (id.as_str(), last(run)));
+        runs.filter(|(_, time)| *time < 0.9 * median).collect()
     }
 
     /// Takes up what another process, or this one, has committed since.

@@ -30,7 +30,18 @@ impl StagedFolder {
 
     pub(super) fn rename_to(self, folder: &Path) -> Result<(), Error> {
         // What is renamed is no longer at the old path, and nothing is there for `drop` to remove.
-        std::fs::rename(&self.path, folder).map_err(io("write", folder))
+        if let Err(error) = std::fs::rename(&self.path, folder) {
+            use std::io::ErrorKind::{AlreadyExists, DirectoryNotEmpty};
+            return Err(match error.kind() {
+                // Another process made a study here meanwhile.
+                AlreadyExists | DirectoryNotEmpty => {
+                    Error::StudyExists { folder: folder.to_owned(), what: "a study is here already".into() }
+                }
+                _ => io("write", folder)(error),
+            });
+        }
+        store::sync_folder(folder.parent().unwrap_or(Path::new(".")));
+        Ok(())
     }
 }
 

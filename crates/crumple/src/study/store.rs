@@ -96,7 +96,7 @@ impl Drop for Staged {
 }
 
 /// Makes a rename last through a power cut, where the system can; elsewhere it is as lasting as its files are.
-fn sync_folder(folder: &Path) {
+pub(crate) fn sync_folder(folder: &Path) {
     if let Ok(folder) = File::open(folder) {
         let _ = folder.sync_all();
     }

@@ -17,7 +17,7 @@ use crate::error::io;
 
 /// A column of a table, by kind.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Column {
+pub(crate) enum Column {
     /// Texts; `None` is null.
     Text(Vec<Option<String>>),
     /// Numbers; `None` is null.
@@ -31,17 +31,22 @@ pub enum Column {
 impl Column {
     /// Numbers where every text that is there is one, texts otherwise.
     pub(crate) fn of_texts(texts: Vec<Option<&str>>) -> Self {
-        let filled = |text: &Option<&str>| text.map(str::trim).filter(|text| !text.is_empty()).map(str::to_owned);
+        let is_value = |text: &&str| !text.is_empty() && !text.eq_ignore_ascii_case("nan");
+        let filled = |text: &Option<&str>| text.map(str::trim).filter(is_value).map(str::to_owned);
         let texts: Vec<Option<String>> = texts.iter().map(filled).collect();
         let numbers: Option<Vec<Option<f64>>> = texts
             .iter()
-            .map(|text| text.as_ref().map(|text| text.parse().ok()).map_or(Some(None), |number| number.map(Some)))
+            .map(|text| {
+                text.as_ref()
+                    .map(|text| text.parse().ok().filter(|x: &f64| x.is_finite()))
+                    .map_or(Some(None), |number| number.map(Some))
+            })
             .collect();
         numbers.map_or(Self::Text(texts), Self::Number)
     }
 
     /// Number of rows.
-    pub fn rows(&self) -> usize {
+    pub(crate) fn rows(&self) -> usize {
         match self {
             Self::Text(values) => values.len(),
             Self::Number(values) => values.len(),
@@ -51,7 +56,7 @@ impl Column {
     }
 
     /// One value as text; empty for null.
-    pub fn cell(&self, row: usize) -> String {
+    pub(crate) fn cell(&self, row: usize) -> String {
         match self {
             Self::Text(values) => values[row].clone().unwrap_or_default(),
             Self::Number(values) => values[row].map(|number| number.to_string()).unwrap_or_default(),
@@ -76,7 +81,11 @@ impl Column {
 ///
 /// # Errors
 /// [`Error::Io`].
-pub fn write_columns(path: &Path, columns: &[(String, Column)], metadata: Option<(&str, String)>) -> Result<(), Error> {
+pub(crate) fn write_columns(
+    path: &Path,
+    columns: &[(String, Column)],
+    metadata: Option<(&str, String)>,
+) -> Result<(), Error> {
     let failed =
         |error: String| Error::Io { action: "write", path: path.to_owned(), source: std::io::Error::other(error) };
     let arrays: Vec<(DataType, ArrayRef)> = columns.iter().map(|(_, column)| column.array()).collect();
@@ -99,6 +108,11 @@ pub fn write_columns(path: &Path, columns: &[(String, Column)], metadata: Option
 
 /// Renews `runs.parquet` from the manifest.
 pub(crate) fn write_runs(folder: &Path, manifest: &Manifest) -> Result<(), Error> {
+    write_columns(&folder.join("runs.parquet"), &run_columns(manifest), None)
+}
+
+/// The records of the runs as a table.
+pub(crate) fn run_columns(manifest: &Manifest) -> Vec<(String, Column)> {
     let runs: Vec<_> = manifest.runs.values().collect();
     let text =
         |value: &dyn Fn(&super::RunRecord) -> String| Column::Text(runs.iter().map(|run| Some(value(run))).collect());
@@ -121,11 +135,11 @@ pub(crate) fn write_runs(folder: &Path, manifest: &Manifest) -> Result<(), Error
         ("warnings".to_owned(), text(&|run| run.warnings.join("; "))),
     ];
     add_inputs(&mut columns, manifest);
-    write_columns(&folder.join("runs.parquet"), &columns, None)
+    columns
 }
 
 /// Appends the inputs of the runs; one that is called like a column that is there gets `input_` before its name.
-pub(crate) fn add_inputs(columns: &mut Vec<(String, Column)>, manifest: &Manifest) {
+fn add_inputs(columns: &mut Vec<(String, Column)>, manifest: &Manifest) {
     for input in &manifest.inputs {
         let values = manifest.runs.values().map(|run| run.inputs.get(input).map(String::as_str)).collect();
         let mut name = input.clone();

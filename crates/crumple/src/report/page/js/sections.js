@@ -42,7 +42,7 @@ function modeCard(mode, showMode) {
     shapeView(original, { group: "cards", label: `${mode.medoid}, the typical run of ${modeTitle(mode.name)}` }),
     el("p", { class: "caption" }, "Typical run: ", runLink(mode.medoid)),
     mode.words ? el("p", { class: "words" }, mode.words) : null,
-    nearest.length ? [el("h4", {}, "Most like it"), el("ol", { class: "nearest" }, nearest.map((near) => el("li", {}, runLink(near.run, " "), el("span", {}, similarity(near.similarity)))))] : null,
+    nearest.length ? [el("h4", { title: "By the descriptor of the typical run: where the part went. A mark shows a run that belongs to another mode." }, "Most like it"), el("ol", { class: "nearest" }, nearest.map((near) => el("li", {}, runLink(near.run, " "), runById.get(near.run)?.mode && runById.get(near.run).mode !== mode.name ? modeMark(runById.get(near.run).mode, 11) : null, el("span", {}, similarity(near.similarity)))))] : null,
     el("h4", {}, members.length <= MEMBERS_SHOWN ? "All its runs" : `Its first ${MEMBERS_SHOWN} runs`),
     el("ul", { class: "members" }, members.slice(0, MEMBERS_SHOWN).map((id) => el("li", {}, runLink(id)))),
     members.length > MEMBERS_SHOWN ? el("button", { class: "more", type: "button", onclick: () => showMode(mode.name) }, `All ${count(members.length)} in the table`) : null);
@@ -132,7 +132,7 @@ function spectrumFigure(mode) {
   if (!descriptor.spectrum?.length) return null;
   const of = descriptor.select === "difference" ? "the displacement" : "the shape";
   return el("figure", {}, el("figcaption", {}, "Coefficients and threshold"), spectrumChart(mode), directionLegend(),
-    el("p", { class: "caption" }, `How much of each eigenvector ${of} contains. An eigenvector is kept when one of its three marks lies above the threshold${descriptor.rule ? ` (${descriptor.rule} of all)` : ""}.`),
+    el("p", { class: "caption" }, `How much of each eigenvector ${of} contains. An eigenvector is kept when one of its three marks reaches the threshold${descriptor.rule ? ` (${descriptor.rule})` : ""}.`),
     descriptor.eigenvectors?.length ? el("p", { class: "caption" }, `Kept: ${shorten(descriptor.eigenvectors)}.`) : null);
 }
 
@@ -156,7 +156,7 @@ function rivalsFigure(mode, size) {
   const words = (method) => method.replace(/^first (\d+)$/, (_, n) => `first ${count(n)} eigenvectors`);
   return el("figure", {}, el("figcaption", {}, "How far rebuilt shapes are off"),
     el("div", { class: "scroll" }, el("table", { class: "plain" }, el("thead", {}, el("tr", {}, ["rebuilt from", "numbers", `average (${lengthUnit})`, `largest (${lengthUnit})`, "of the displacement"].map((title, c) => el("th", { scope: "col", class: c ? "number" : null }, title)))),
-      el("tbody", {}, rows.map((row) => el("tr", { class: row.own ? "own" : null }, el("td", {}, words(row.method)), [missing(row.size) ? "–" : count(3 * row.size), average(row.rms), largest(row.max), missing(row.relative) ? "–" : `${(100 * row.relative).toFixed(1)}\u00a0%`].map((text, c) => el("td", { class: "number" }, c === 1 ? bar(row.rms, d3.max(rows, (r) => r.rms)) : null, el("span", {}, text)))))))),
+      el("tbody", {}, rows.map((row) => el("tr", { class: row.own ? "own" : null }, el("td", {}, words(row.method)), [missing(row.size) ? "–" : count(row.method === "PCA" ? row.size : 3 * row.size), average(row.rms), largest(row.max), missing(row.relative) ? "–" : `${(100 * row.relative).toFixed(1)}\u00a0%`].map((text, c) => el("td", { class: "number" }, c === 1 ? bar(row.rms, d3.max(rows, (r) => r.rms)) : null, el("span", {}, text)))))))),
     el("p", { class: "caption" }, "Average is the root mean square distance over the surface; the last column sets it against the root mean square displacement of the run. Principal components (PCA) are learnt from these very runs, eigenvectors from the undeformed part alone."));
 }
 
@@ -178,8 +178,8 @@ function studyFacts() {
     ["Separate pieces", missing(study.components) ? null : `${study.components}${study.joined ? `; vertices of different pieces up to ${withUnit(study.joined)} apart were joined` : study.components > 1 ? ", not joined" : ""}`],
     ["Joining", study.join_advice],
     ["Eigenvectors", study.eigenpairs && `${count(study.eigenpairs)}${study.complete === true ? ", certified: none is missing" : study.complete === false ? "; some may be missing" : ""}`],
-    ["Accuracy", missing(study.residual) ? null : `largest residual ${number(study.residual, 2)}${missing(study.orthogonality) ? "" : `, orthogonal within ${number(study.orthogonality, 2)}`}`],
-    ["Captured", missing(study.captured) ? null : `${shareText(study.captured, 2)} of the displacement of a run, on average`],
+    ["Accuracy", missing(study.residual) ? null : `largest residual ${number(study.residual, 2)} as stored, in single precision${missing(study.orthogonality) ? "" : `, orthogonal within ${number(study.orthogonality, 2)}`}`],
+    ["Captured", missing(study.captured_min) ? null : `at least ${shareText(study.captured_min, 2)} of the displacement of each run`],
     ["Surface", study.isometry],
   ].filter(([, value]) => value);
   return el("div", { class: "card" }, el("h3", {}, "How far to trust it"), el("dl", {}, rows.map(([name, value]) => [el("dt", {}, name), el("dd", {}, value)])));

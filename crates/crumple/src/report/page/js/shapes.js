@@ -59,7 +59,9 @@ function frameOf(keys, direction) {
 const originalOf = (mode) => mode.descriptor?.shapes?.original ?? `run:${mode.medoid}`;
 const originals = modes.map((mode) => originalOf(mode)).filter(hasShape);
 const anyShape = Object.keys(findings.shapes ?? {}).find(hasShape);
-const framed = originals.length ? originals : anyShape ? [anyShape] : [];
+// Pictures of the nearest runs share the frame, so they must fit into it.
+const nearestShapes = modes.flatMap((mode) => (mode.descriptor?.nearest ?? []).map((near) => `run:${near.run}`)).filter(hasShape);
+const framed = originals.length ? [...originals, ...nearestShapes] : anyShape ? [anyShape] : [];
 const frame = framed.length ? frameOf(framed, defaultDirection(referencePositions ?? positionsOf(framed[0]))) : null;
 
 /** The colours span −range … range: the largest z-displacement of the typical runs, rounded up to a plain number. */

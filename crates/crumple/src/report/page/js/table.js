@@ -22,7 +22,7 @@ function tableColumns() {
     ...inputs.map((name, c) => (inputIsNumeric(c)
       ? numeric(inputTitle(name), "From the input table", (run) => { const v = asNumber(run.inputs?.[c]); return Number.isNaN(v) ? null : v; }, (v, run) => (missing(v) ? "–" : run.inputs[c].replace("-", "−")))
       : { title: inputTitle(name), hint: "From the input table", value: (run) => run.inputs?.[c] || null, show: (run) => (run.inputs?.[c] ? breakable(run.inputs[c]) : "–"), words: true })),
-    { title: "notes", value: (run) => run.warnings?.join("; ") || null, show: (run) => run.warnings?.join("; ") || "", words: true },
+    { title: "notes", value: (run) => run.warnings?.join("; ") || null, show: (run) => el("span", { title: run.warnings?.join("; ") || null }, run.warnings?.join("; ") || ""), words: true },
   ];
   return columns.filter((column) => column.fixed || runs.some((run) => !missing(column.value(run))));
 }
