@@ -53,7 +53,9 @@ pub(super) fn shapes(
 ) -> Result<(MeshData, BTreeMap<String, String>), Error> {
     let reference = &loaded.reference;
     let needed = 4 * described.len() + 1;
-    let thin = Thin::of(reference.mesh.vertices(), reference.mesh.triangles(), (SHAPE_BYTES / 6 / needed).max(1000));
+    // A vertex takes 6 bytes a shape, and its share of the triangles, two of 12 bytes, once.
+    let thin =
+        Thin::of(reference.mesh.vertices(), reference.mesh.triangles(), (SHAPE_BYTES / (6 * needed + 24)).max(1000));
     let mut wanted: Vec<(String, Vec<[f64; 3]>)> = vec![("reference".into(), thin.shape(reference.mesh.vertices()))];
     for (mode, described) in modes.modes.iter().zip(described) {
         wanted.push((format!("run:{}", mode.medoid), thin.shape(&described.original)));
@@ -61,7 +63,8 @@ pub(super) fn shapes(
         wanted.push((format!("{}:descriptor", mode.name), thin.shape(&described.reconstruction)));
         wanted.push((format!("{}:first_m", mode.name), thin.shape(&described.first_m)));
     }
-    let room = (SHAPE_BYTES / (6 * thin.vertices.len())).saturating_sub(wanted.len());
+    let vertices = thin.vertices.len();
+    let room = (SHAPE_BYTES.saturating_sub(24 * vertices) / (6 * vertices)).saturating_sub(wanted.len());
     let rows = loaded.last_states()?;
     let runs = &rows.runs;
     let others: Vec<usize> =

@@ -2,30 +2,34 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{Error, LOCK, store};
+use super::{Error, store};
 use crate::error::io;
 
-/// A folder that is being filled under a temporary name, removed unless it was renamed.
+const LOCKED: &str = "lock";
+
+/// A folder that is being filled under a temporary name, removed unless it was renamed. A locked file beside it tells
+/// the folder of a live process from that of a killed one.
 pub(super) struct StagedFolder {
     pub(super) path: PathBuf,
-    /// Held as long as the folder is being filled: tells the folder of a killed process from that of a live one.
-    _lock: store::Lock,
+    lock: store::Lock,
 }
 
 impl StagedFolder {
     pub(super) fn beside(folder: &Path) -> Result<Self, Error> {
         let parent = folder.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
         std::fs::create_dir_all(parent).map_err(io("make the folder", parent))?;
-        for path in store::temporaries(parent, &folder.file_name().unwrap_or_default().to_string_lossy()) {
-            if path.is_dir() && matches!(store::Lock::try_exclusive(&path.join(LOCK)), Ok(Some(_))) {
-                // Left by a killed process; if it cannot be removed it is in nobody's way.
-                let _ = std::fs::remove_dir_all(&path);
+        clear_dead(parent, &folder.file_name().unwrap_or_default().to_string_lossy());
+        loop {
+            let path = store::temporary_name(folder);
+            let lock = store::Lock::exclusive(&lock_of(&path))?;
+            // Between making the file and locking it, somebody may have taken it for a dead one and removed it.
+            if !lock_of(&path).exists() {
+                continue;
             }
+            let staged = Self { path, lock };
+            std::fs::create_dir(&staged.path).map_err(io("make the folder", folder))?;
+            return Ok(staged);
         }
-        let path = store::temporary_name(folder);
-        std::fs::create_dir(&path).map_err(io("make the folder", folder))?;
-        let lock = store::Lock::exclusive(&path.join(LOCK))?;
-        Ok(Self { path, _lock: lock })
     }
 
     pub(super) fn rename_to(self, folder: &Path) -> Result<(), Error> {
@@ -47,7 +51,25 @@ impl StagedFolder {
 
 impl Drop for StagedFolder {
     fn drop(&mut self) {
-        // The failure that led here is what the user hears of.
+        // The failure that led here is what the user hears of. The lock is held until both are gone.
+        let _held = &self.lock;
         let _ = std::fs::remove_dir_all(&self.path);
+        let _ = std::fs::remove_file(lock_of(&self.path));
+    }
+}
+
+/// The file that is locked as long as the folder is being filled.
+fn lock_of(path: &Path) -> PathBuf {
+    path.with_file_name(format!("{}.{LOCKED}", path.file_name().unwrap_or_default().to_string_lossy()))
+}
+
+/// Removes what killed processes left; what cannot be removed is in nobody's way.
+fn clear_dead(parent: &Path, name: &str) {
+    for left in store::temporaries(parent, name) {
+        let folder = if left.extension().is_some_and(|end| end == LOCKED) { left.with_extension("") } else { left };
+        if let Ok(Some(_dead)) = store::Lock::try_exclusive(&lock_of(&folder)) {
+            let _ = std::fs::remove_dir_all(&folder);
+            let _ = std::fs::remove_file(lock_of(&folder));
+        }
     }
 }
