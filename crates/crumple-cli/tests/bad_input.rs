@@ -337,7 +337,7 @@ fn names_that_the_study_does_not_know() {
     let out = own.beside("shape.stl");
     untouched(&own, || {
         for run in ["run_999", "RUN_007", "run_07", "7", "run_007@first", "run_007@-1", "@2", "run_007@"] {
-            crumple!["describe", &study, run].refused(&[&format!("'{run}'")]).hints("list the ids");
+            crumple!["describe", &study, run].refused(&[&format!("'{run}'")]).hints("lists the ids");
             crumple!["verify", &study, "target", "run_001", run].refused(&[&format!("'{run}'")]);
             crumple!["distance", &study, "target", run].refused(&[&format!("'{run}'")]);
             crumple!["reconstruct", &study, run, "-o", &out].refused(&[&format!("'{run}'")]);

@@ -24,6 +24,19 @@ fn cut_run(to: &Path) -> PathBuf {
 }
 
 #[test]
+fn a_study_tells_what_it_holds() {
+    let place = folder();
+    let study = own_study(place.path());
+    crumple!["describe", &study, "run_001", "--name", "mine"].done();
+    let told = crumple!["info", &study, "--json"].done().json();
+    assert_eq!(texts(&told["runs"]), world::DOZEN);
+    assert!(texts(&told["descriptors"]).contains(&"mine"));
+    assert_eq!(rows(&told["modes"]).len(), rows(&dozen().analyzed["modes"]["modes"]).len());
+    assert_eq!((&told["vertices"], &told["eigenpairs"]), (&1862.into(), &500.into()));
+    assert!(crumple!["info", &study].done().stdout.contains("run_001"));
+}
+
+#[test]
 fn descriptors_of_modes_that_are_gone_go_with_them() {
     let place = folder();
     let study = own_study(place.path());

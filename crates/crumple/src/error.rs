@@ -353,7 +353,7 @@ impl Error {
                 _ => return None,
             },
             Self::UnknownRun { .. } => {
-                "`crumple search` and runs.parquet list the ids; a run's id is its path below the folder that was added"
+                "`crumple info STUDY` lists the ids; a run's id is its path below the folder that was added"
             }
             Self::UnknownState { .. } => "states count from @0; @last is the last one",
             Self::RunChanged { .. } => "replace it with `crumple add --replace`, or give it another name",

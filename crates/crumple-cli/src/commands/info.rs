@@ -3,16 +3,21 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use crumple::{Error, run::Run};
+use crumple::run::Run;
+use crumple::study::Study;
+use crumple::{Error, descriptor, modes};
 use serde_json::json;
 
 use super::Answer;
 use crate::output::{Output, table, time};
 
 #[derive(Args)]
-#[command(after_help = "Example, in the repository:\n  crumple info examples/hat-section/runs/run_001")]
+#[command(
+    after_help = "Example, in the repository:\n  crumple info examples/hat-section/runs/run_001\n  crumple info study"
+)]
 pub(crate) struct Info {
-    /// Root file of a family (d3plot), or its folder
+    /// Root file of a family (d3plot), its folder, or a study: then its runs, modes and descriptors
+    #[arg(value_name = "RUN")]
     run: PathBuf,
 }
 
@@ -20,6 +25,9 @@ impl Info {
     pub(crate) fn run(&self, output: &Output) -> Result<Answer, Error> {
         if !self.run.exists() {
             return Err(Error::NoSuchPath(self.run.clone()));
+        }
+        if self.run.join("manifest.json").is_file() {
+            return self.study(output);
         }
         let info = Run::open("", &self.run)?.info();
         output.print(&json!(info), || {
@@ -55,6 +63,42 @@ impl Info {
                 text += &format!("\nwarning: {}", warning.message);
             }
             text
+        });
+        Ok(Answer::Done)
+    }
+
+    /// What a study holds.
+    fn study(&self, output: &Output) -> Result<Answer, Error> {
+        let study = Study::open(&self.run)?;
+        let (manifest, settings) = (study.manifest(), study.settings());
+        let modes = match modes::load(&study) {
+            Err(Error::NoModes) => Vec::new(),
+            other => other?.modes,
+        };
+        let names: Vec<&str> = modes.iter().map(|mode| mode.name.as_str()).collect();
+        let descriptors = descriptor::list(&study)?;
+        let facts = json!({
+            "study": study.folder(), "reference": settings.reference, "parts": settings.parts, "join": settings.join,
+            "vertices": manifest.vertices, "eigenpairs": manifest.eigenpairs, "inputs": manifest.inputs,
+            "runs": manifest.runs.keys().collect::<Vec<_>>(), "modes": names, "descriptors": descriptors,
+        });
+        output.print(&facts, || {
+            let mode_of = |run: &str| modes.iter().find(|mode| mode.members.iter().any(|member| member == run));
+            let rows = manifest.runs.iter().map(|(id, run)| {
+                let last = run.times.last().copied().unwrap_or_default();
+                let mode = mode_of(id).map_or("–", |mode| &mode.name).to_owned();
+                vec![id.clone(), run.times.len().to_string(), time(last), mode, run.path.display().to_string()]
+            });
+            let or_none = |names: &[String]| if names.is_empty() { "none yet".to_owned() } else { names.join(", ") };
+            format!(
+                "study of {} runs on {} vertices, {} eigenpairs; reference {}\ndescriptors: {}\n{}",
+                manifest.runs.len(),
+                manifest.vertices,
+                manifest.eigenpairs,
+                settings.reference,
+                or_none(&descriptors),
+                table(&["run", "#states", "#last time", "mode", "file"], rows)
+            )
         });
         Ok(Answer::Done)
     }

@@ -33,7 +33,7 @@ pub(crate) enum Answer {
 pub(crate) enum Command {
     /// All of it: find the runs, make the study, find the modes, describe them, write the report
     Analyze(analyze::Analyze),
-    /// What a result file holds: format, parts, states, fields, problems
+    /// What a result file or a study holds
     Info(info::Info),
     /// Make a study: the reference mesh and its eigenbasis
     Init(init::Init),
