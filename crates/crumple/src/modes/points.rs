@@ -80,13 +80,15 @@ impl Points {
 /// Centred, and divided by the root mean square length of the rows; rows that are all equal become zero.
 fn standardised(mut rows: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
     let count = rows.len() as f64;
+    let length = |rows: &[Vec<f64>]| (rows.iter().flatten().map(|x| x * x).sum::<f64>() / count).sqrt();
+    let before = length(&rows);
     let mut mean = vec![0.0; rows.first().map_or(0, Vec::len)];
     rows.iter().for_each(|row| mean.iter_mut().zip(row).for_each(|(mean, x)| *mean += x / count));
     rows.iter_mut().for_each(|row| row.iter_mut().zip(&mean).for_each(|(x, mean)| *x -= mean));
-    let length = (rows.iter().flatten().map(|x| x * x).sum::<f64>() / count).sqrt();
-    if length > 0.0 {
-        rows.iter_mut().flatten().for_each(|x| *x /= length);
-    }
+    let deviation = length(&rows);
+    // Coefficients are f32: what is left below that, when equal runs are centred, is rounding.
+    let scale = if deviation > 1e-7 * before { 1.0 / deviation } else { 0.0 };
+    rows.iter_mut().flatten().for_each(|x| *x *= scale);
     rows
 }
 
