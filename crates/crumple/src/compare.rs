@@ -196,9 +196,7 @@ impl<'a> Arena<'a> {
         threshold: Threshold,
     ) -> Result<Self, Error> {
         let pca = Pca::of(rows, rows.rows());
-        let delta = |row: usize| -> Vec<[f64; 3]> {
-            rows.row(row).as_chunks().0.iter().map(|triple: &[f32; 3]| triple.map(f64::from)).collect()
-        };
+        let delta = |row: usize| rows.triples(row);
         let chosen = |row: usize| {
             let target = Target {
                 run: rows.runs[row].clone(),

@@ -8,7 +8,7 @@ use crate::basis::coefficients;
 use crate::bundle;
 use crate::project::project;
 use crate::run::Run;
-use crate::study::{Loaded, Rows, Study};
+use crate::study::{Loaded, Rows, Study, triples};
 
 /// A run and a state as they were written.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -85,7 +85,7 @@ pub fn resolve(loaded: &Loaded, named: &Named) -> Result<Target, Error> {
     if study.manifest().runs.contains_key(&named.run) {
         let rows = study.coefficients(None, Rows::Run(&named.run))?;
         let state = state_of(named, rows.rows())?;
-        let delta = rows.row(state).as_chunks().0.iter().map(|triple| triple.map(f64::from)).collect();
+        let delta = rows.triples(state);
         let warnings = study.record(&named.run)?.warnings.clone();
         return Ok(Target { run: named.run.clone(), state, time: rows.times[state], delta, warnings });
     }
@@ -93,7 +93,7 @@ pub fn resolve(loaded: &Loaded, named: &Named) -> Result<Target, Error> {
     let projected = project(&run, &loaded.reference, &loaded.basis, &())?;
     let state = state_of(named, projected.states.len())?;
     let found = &projected.states[state];
-    let delta = found.delta.as_chunks().0.iter().map(|triple| triple.map(f64::from)).collect();
+    let delta = triples(&found.delta);
     Ok(Target { run: projected.run, state, time: found.time, delta, warnings: projected.warnings })
 }
 

@@ -32,13 +32,7 @@ impl Points {
     /// deviation, so that kind and direction weigh alike; then of length 1, so that distances follow the angle (cosine)
     /// and a strong and a weak deformation of one kind stay together.
     pub(crate) fn by_rotation(rows: &Coefficients) -> Self {
-        let spectra: Vec<(Vec<f64>, Vec<f64>)> = (0..rows.rows())
-            .map(|row| {
-                let rho: Vec<[f64; 3]> =
-                    rows.row(row).as_chunks().0.iter().map(|triple: &[f32; 3]| triple.map(f64::from)).collect();
-                spectrum(&rho)
-            })
-            .collect();
+        let spectra: Vec<(Vec<f64>, Vec<f64>)> = (0..rows.rows()).map(|row| spectrum(&rows.triples(row))).collect();
         let (kinds, directions): (Vec<Vec<f64>>, Vec<Vec<f64>>) = spectra.into_iter().unzip();
         let (kinds, directions) = (standardised(kinds), standardised(directions));
         let values: Vec<Vec<f64>> =

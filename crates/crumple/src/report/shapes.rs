@@ -92,8 +92,7 @@ pub(super) fn shapes(
 /// The last state of a run from its file; where that is gone or another one, from its K coefficients.
 fn last_shape(loaded: &Loaded, row: usize) -> Result<Vec<[f64; 3]>, Error> {
     let rows = loaded.last_states()?;
-    let delta: Vec<[f64; 3]> =
-        rows.row(row).as_chunks().0.iter().map(|triple: &[f32; 3]| triple.map(f64::from)).collect();
+    let delta = rows.triples(row);
     let run = rows.runs[row].clone();
     let target = Target {
         run: run.clone(),

@@ -70,6 +70,11 @@ impl Coefficients {
         &self.values[row * width..(row + 1) * width]
     }
 
+    /// One row as |eigenvectors| × 3.
+    pub fn triples(&self, row: usize) -> Vec<[f64; 3]> {
+        triples(self.row(row))
+    }
+
     /// Adds the rows of another part.
     pub(crate) fn append(&mut self, mut other: Self) {
         self.runs.append(&mut other.runs);
@@ -169,6 +174,11 @@ fn record_batch<'a>(
         }
     }
     RecordBatch::try_new(Arc::new(Schema::new(fields)), columns).map_err(|error| Error::Internal(error.to_string()))
+}
+
+/// Stored coefficients, x, y, z of one eigenvector after another, as triples.
+pub(crate) fn triples(stored: &[f32]) -> Vec<[f64; 3]> {
+    stored.as_chunks().0.iter().map(|triple: &[f32; 3]| triple.map(f64::from)).collect()
 }
 
 /// Name of the column of an eigenvector (counted from 1) and a component (0, 1, 2).

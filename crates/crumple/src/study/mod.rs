@@ -36,6 +36,7 @@ use serde::{Deserialize, Serialize};
 
 pub use add::{AddOptions, Added};
 pub use check::{Checkup, check};
+pub(crate) use coefficients::triples;
 pub use coefficients::{Coefficients, Function, column_name};
 pub use loaded::Loaded;
 pub use manifest::{FileRecord, LAYOUT, Manifest, RunRecord};
