@@ -29,15 +29,17 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod csr;
 mod eigen;
 mod inspect;
 mod join;
 mod mesh;
 mod operator;
 mod proximity;
+mod split;
 
 pub use eigen::{Certificate, EigenError, EigenOptions, Eigenbasis, InertiaCount, Method, Watch, eigenbasis};
 pub use inspect::{Inspection, inspect};
 pub use join::{Join, JoinError, join};
 pub use mesh::{Mesh, MeshError};
-pub use operator::{Csr, Operator, OperatorError, OperatorOptions, operator};
+pub use operator::{Csr, Kind, Mass, Operator, OperatorError, OperatorOptions, UnknownName, operator};
