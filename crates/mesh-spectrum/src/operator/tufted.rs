@@ -122,14 +122,13 @@ impl Cover {
     fn flip_to_delaunay(&mut self) -> Result<usize, usize> {
         let half_edges = self.origin.len();
         let mut open: Vec<u32> = (0..half_edges as u32).filter(|&h| h < self.twin[h as usize]).collect();
-        let mut waiting = vec![true; half_edges];
+        let mut waiting: Vec<bool> = self.twin.iter().zip(0..).map(|(&twin, h)| h < twin).collect();
         let mut flips = 0;
         while let Some(h) = open.pop() {
             let h = h as usize;
             waiting[h] = false;
             let g = self.twin[h] as usize;
-            // A not-a-number is left alone here and refused where the matrices are made.
-            if h / 3 == g / 3 || !(self.cot(h) + self.cot(g) < DELAUNAY) || !self.flip(h) {
+            if h / 3 == g / 3 || self.cot(h) + self.cot(g) >= DELAUNAY || !self.flip(h) {
                 continue;
             }
             flips += 1;
