@@ -10,6 +10,34 @@ use crumple::inputs::Table;
 use crumple::modes::ModesOptions;
 use crumple::similarity::SimilarityOptions;
 use crumple::study::Rows;
+use crumple::{OperatorOptions, UnknownName};
+
+/// The operator.
+#[derive(Args)]
+pub(crate) struct OperatorArgs {
+    /// Discretisation of the Laplacian: cotan, tufted (any faces, no negative weights; for meshes that are non-manifold
+    /// or badly shaped) or polygon (quads without choosing a diagonal) [default: cotan]
+    #[arg(long, value_name = "OPERATOR")]
+    operator: Option<String>,
+    /// Mass matrix: lumped (a third of each triangle's area to each corner), consistent (not diagonal; slower) or
+    /// identity (every vertex the same, as the paper's formula has it) [default: lumped]
+    #[arg(long, value_name = "MASS")]
+    mass: Option<String>,
+    /// Treat separate sheets as one: mutually nearest vertices of different pieces of the mesh that are closer than this
+    /// (length unit of the model) share one degree of freedom. A distance is recommended where sheets lie close
+    #[arg(long, value_name = "DISTANCE", allow_negative_numbers = true)]
+    join: Option<f64>,
+}
+
+impl OperatorArgs {
+    pub(crate) fn options(&self) -> Result<OperatorOptions, Error> {
+        let wrong =
+            |name| move |error: UnknownName| Error::Value { name, value: error.name, expected: error.expected.into() };
+        let kind = self.operator.as_deref().map(str::parse).transpose().map_err(wrong("--operator"))?;
+        let mass = self.mass.as_deref().map(str::parse).transpose().map_err(wrong("--mass"))?;
+        Ok(OperatorOptions { join: self.join, kind: kind.unwrap_or_default(), mass: mass.unwrap_or_default() })
+    }
+}
 
 /// The surface and its eigenbasis.
 #[derive(Args)]
@@ -17,19 +45,18 @@ pub(crate) struct BasisArgs {
     /// Part whose shells make the surface, by id or title; may be given several times [default: all shells]
     #[arg(long = "part", value_name = "PART")]
     pub(crate) parts: Vec<String>,
-    /// Treat separate sheets as one: mutually nearest vertices of different pieces of the mesh that are closer than this
-    /// (length unit of the model) share one degree of freedom. `init` recommends a distance where sheets lie close
-    #[arg(long, value_name = "DISTANCE", allow_negative_numbers = true)]
-    join: Option<f64>,
+    #[command(flatten)]
+    operator: OperatorArgs,
     /// Eigenpairs K of the basis, 1 or more; each costs time and space, and resolves finer folds [default: 500]
     #[arg(short = 'K', long, value_name = "K", allow_negative_numbers = true)]
     eigenpairs: Option<usize>,
 }
 
 impl BasisArgs {
-    pub(crate) fn options(&self) -> BasisOptions {
+    pub(crate) fn options(&self) -> Result<BasisOptions, Error> {
         let default = BasisOptions::default();
-        BasisOptions { eigenpairs: self.eigenpairs.unwrap_or(default.eigenpairs), join: self.join }
+        let eigenpairs = self.eigenpairs.unwrap_or(default.eigenpairs);
+        Ok(BasisOptions { eigenpairs, operator: self.operator.options()? })
     }
 }
 

@@ -8,10 +8,12 @@
 //! | open result files, find and name them | [`run`], [`bundle`] | paths | [`run::Run`] |
 //! | input tables | [`inputs`] | CSV | a row a run |
 //! | the surface all runs share | [`mod@reference`] | a run, parts | [`reference::Reference`] |
+//! | the surface of any file | [`surface`] | a mesh file or a run | [`surface::Surface`] |
 //! | eigenbasis | [`basis`] | the reference | [`basis::Basis`] |
 //! | how each place has turned | [`rotation`] | a shape | sin θ × axis |
 //! | coefficients of every state | [`project`] | a run | [`project::Projected`] |
 //! | what is kept on disk | [`study`] | all of it | [`study::Study`] |
+//! | eigenpairs of a surface, alone | [`eigen`] | a surface | [`eigen::Solved`], a file |
 //! | a state that the user names | [`target`] | `run_007@3` | [`target::Target`] |
 //! | deformation modes | [`modes`] | coefficients | [`modes::Modes`] |
 //! | which coefficients are looked at | [`select`] | α or δ | values |
@@ -29,6 +31,7 @@ pub mod basis;
 pub mod bundle;
 pub mod compare;
 pub mod descriptor;
+pub mod eigen;
 mod error;
 pub mod export;
 pub mod inputs;
@@ -43,7 +46,8 @@ pub mod run;
 pub mod select;
 pub mod similarity;
 pub mod study;
+pub mod surface;
 pub mod target;
 
 pub use error::Error;
-pub use mesh_spectrum::Watch;
+pub use mesh_spectrum::{EigenOptions, Kind, Mass, OperatorOptions, UnknownName, Watch};

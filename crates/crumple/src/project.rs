@@ -174,6 +174,8 @@ impl Measures {
 struct Geometry<'a> {
     undeformed: &'a [[f64; 3]],
     mass: &'a [f64],
+    /// For M-products where the mass is not diagonal.
+    basis: &'a Basis,
     area: f64,
     /// Σ m |p⁰ − centre|²: the size of the part.
     spread: f64,
@@ -197,7 +199,7 @@ impl<'a> Geometry<'a> {
         let edges: Vec<_> = ends.into_iter().map(|(a, b)| (a, b, length(a, b))).filter(|edge| edge.2 > 0.0).collect();
         let edge_mean = edges.iter().map(|edge| edge.2).sum::<f64>() / edges.len().max(1) as f64;
         let (mass, area) = (&basis.mass[..], basis.mass.iter().sum());
-        let mut geometry = Self { undeformed, mass, area, spread: 0.0, edges, edge_mean };
+        let mut geometry = Self { undeformed, mass, basis, area, spread: 0.0, edges, edge_mean };
         let centre = geometry.centre(undeformed);
         let square = |p: &[f64; 3]| (0..3).map(|c| (p[c] - centre[c]).powi(2)).sum::<f64>();
         geometry.spread = undeformed.iter().zip(mass).map(|(p, m)| m * square(p)).sum();
@@ -216,6 +218,13 @@ impl<'a> Geometry<'a> {
     fn measures(&self, shape: &[[f64; 3]], displacement: &[[f64; 3]], delta: &[[f64; 3]]) -> Measures {
         let square = |d: &[f64; 3]| d.iter().map(|x| x * x).sum::<f64>();
         let norm2: f64 = displacement.iter().zip(self.mass).map(|(d, m)| m * square(d)).sum();
+        let norm2_m: f64 = match self.basis.mass_matrix {
+            Some(_) => {
+                let weighed = self.basis.weigh(displacement);
+                displacement.iter().zip(&weighed).map(|(d, w)| (0..3).map(|c| d[c] * w[c]).sum::<f64>()).sum()
+            }
+            None => norm2,
+        };
         let max = displacement.iter().map(square).fold(0.0, f64::max).sqrt();
         let caught: f64 = delta.iter().map(square).sum();
         let mut strains: Vec<f64> = self
@@ -230,7 +239,7 @@ impl<'a> Geometry<'a> {
         Measures {
             rms: (norm2 / self.area).sqrt(),
             max,
-            captured: if norm2 > 0.0 { (caught / norm2).min(1.0) } else { 1.0 },
+            captured: if norm2 > 0.0 { (caught / norm2_m).min(1.0) } else { 1.0 },
             // Of a displacement that is tiny against the part the difference of two large sums says nothing.
             rigid_share: if norm2 > 1e-12 * self.spread {
                 (1.0 - self.rigid_rest(shape) / norm2).clamp(0.0, 1.0)

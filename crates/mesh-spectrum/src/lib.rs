@@ -39,7 +39,7 @@ mod proximity;
 mod split;
 
 pub use eigen::{Certificate, EigenError, EigenOptions, Eigenbasis, InertiaCount, Method, Watch, eigenbasis};
-pub use inspect::{Inspection, inspect};
+pub use inspect::{Inspection, Reason, inspect};
 pub use join::{Join, JoinError, join};
 pub use mesh::{Mesh, MeshError};
 pub use operator::{Csr, Kind, Mass, Operator, OperatorError, OperatorOptions, UnknownName, operator};

@@ -23,6 +23,8 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
+pub(crate) use cotan::cotangents;
+
 pub use crate::csr::Csr;
 use crate::join::{Join, JoinError, join};
 use crate::mesh::{Mesh, Union};

@@ -123,7 +123,7 @@ impl Analyze {
     }
 
     fn open_or_create(&self, reference: &Run, runs: usize, watch: &dyn Watch) -> Result<Study, Error> {
-        let options = self.basis.options();
+        let options = self.basis.options()?;
         if runs < modes::RUNS_MIN && !self.output.exists() {
             // Found out before the eigenbasis is computed, but after what else is wrong with the one run.
             Reference::of_run(reference, &self.basis.parts)?;
@@ -138,7 +138,7 @@ impl Analyze {
                 if study.is_for(reference, &self.basis.parts, &options)? {
                     return Ok(study);
                 }
-                let what = "the study here has another mesh, other parts, another join or another number of eigenpairs"
+                let what = "the study here has another mesh, other parts, another operator, another join or another number of eigenpairs"
                     .to_owned();
                 Err(Error::StudyExists { folder, what })
             }

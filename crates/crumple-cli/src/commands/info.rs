@@ -79,6 +79,7 @@ impl Info {
         let descriptors = descriptor::list(&study)?;
         let facts = json!({
             "study": study.folder(), "reference": settings.reference, "parts": settings.parts, "join": settings.join,
+            "operator": settings.operator, "mass": settings.mass,
             "vertices": manifest.vertices, "eigenpairs": manifest.eigenpairs, "inputs": manifest.inputs,
             "runs": manifest.runs.keys().collect::<Vec<_>>(), "modes": names, "descriptors": descriptors,
         });
@@ -91,10 +92,12 @@ impl Info {
             });
             let or_none = |names: &[String]| if names.is_empty() { "none yet".to_owned() } else { names.join(", ") };
             format!(
-                "study of {} runs on {} vertices, {} eigenpairs; reference {}\ndescriptors: {}\n{}",
+                "study of {} runs on {} vertices, {} eigenpairs ({}, {} mass); reference {}\ndescriptors: {}\n{}",
                 manifest.runs.len(),
                 manifest.vertices,
                 manifest.eigenpairs,
+                settings.operator,
+                settings.mass,
                 settings.reference,
                 or_none(&descriptors),
                 table(&["run", "#states", "#last time", "mode", "file"], rows)

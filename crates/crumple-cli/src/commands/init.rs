@@ -39,7 +39,7 @@ impl Init {
             });
         };
         let run = Run::open(&only.id, &only.path)?;
-        let study = Study::create(&self.study, &run, &self.basis.parts, &self.basis.options(), watch)?;
+        let study = Study::create(&self.study, &run, &self.basis.parts, &self.basis.options()?, watch)?;
         let loaded = Loaded::of(study)?;
         let facts = facts(&loaded);
         output.print(&facts, || words(&loaded));
@@ -60,6 +60,9 @@ pub(crate) fn facts(loaded: &Loaded) -> Value {
         "area": facts.area,
         "components": facts.components,
         "null_space": facts.null_space,
+        "operator": facts.operator,
+        "mass": facts.mass,
+        "tufted_advice": facts.tufted_advice,
         "join": facts.join,
         "joined_pairs": facts.joined_pairs,
         "join_advice": facts.join_advice,
@@ -80,13 +83,15 @@ fn words(loaded: &Loaded) -> String {
     let join =
         facts.join.map_or_else(String::new, |distance| format!(", {} pairs joined at {distance}", facts.joined_pairs));
     format!(
-        "study      {}\nsurface    {} vertices, {} triangles, {} piece{}{join}; parts: {}\nbasis      {} eigenpairs, none missing: {}; residual {:.1e}, orthogonality {:.1e}",
+        "study      {}\nsurface    {} vertices, {} triangles, {} piece{}{join}; parts: {}\noperator   {}, {} mass\nbasis      {} eigenpairs, none missing: {}; residual {:.1e}, orthogonality {:.1e}",
         loaded.study.folder().display(),
         loaded.reference.vertices(),
         loaded.reference.mesh.triangles().len(),
         facts.components,
         if facts.components == 1 { "" } else { "s" },
         loaded.reference.parts.join(", "),
+        facts.operator,
+        facts.mass,
         loaded.basis.eigenpairs(),
         if facts.complete { "certified" } else { "not certified" },
         facts.residual,
@@ -116,10 +121,16 @@ pub(crate) fn advise(basis: &Basis, output: &Output) {
     if facts.join.is_some() && facts.joined_pairs == 0 {
         output.note("the join found no pair of vertices within its distance; the pieces stay apart");
     }
-    if facts.non_manifold_edges > 0 {
-        output.note(&format!("{} edges have more than two faces; all of them are summed", facts.non_manifold_edges));
-    }
+    tufted(&facts.tufted_advice, output);
     if facts.flat_triangles > 0 {
         output.note(&format!("{} triangles have no area and are left out of the operator", facts.flat_triangles));
+    }
+}
+
+/// Recommends the tufted operator where there are reasons for it.
+pub(crate) fn tufted(reasons: &[String], output: &Output) {
+    if !reasons.is_empty() {
+        let reasons = reasons.join("; ");
+        output.note(&format!("{reasons}. The operator made for such meshes: --operator tufted"));
     }
 }

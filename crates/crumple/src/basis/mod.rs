@@ -1,6 +1,7 @@
 //! The eigenbasis of the reference mesh, as a study keeps it, and what it is good for.
 //!
-//! L φ = λ M φ with cotangent stiffness L and lumped mass M, Φᵀ M Φ = I; see `mesh-spectrum` for the solver. A study
+//! L φ = λ M φ with cotangent stiffness L and lumped mass M, or another operator of `mesh-spectrum`, Φᵀ M Φ = I; the
+//! solver is there too. A study
 //! stores eigenvectors as f32, and everything is computed with the rounded ones, so that a run added later is
 //! projected on exactly the vectors of the first.
 
@@ -8,7 +9,7 @@ mod transform;
 
 use std::ops::Range;
 
-use mesh_spectrum::{EigenOptions, OperatorOptions, Watch};
+use mesh_spectrum::{Csr, EigenOptions, Kind, Mass, OperatorOptions, Watch};
 use serde::{Deserialize, Serialize};
 
 pub(crate) use transform::coefficients_of;
@@ -22,14 +23,14 @@ use crate::reference::Reference;
 pub struct BasisOptions {
     /// Eigenpairs K. Default 500 (Iza-Teran and Garcke 2018); a mesh with fewer vertices gives as many as it has.
     pub eigenpairs: usize,
-    /// Mutually nearest vertices of different components closer than this become one degree of freedom of the
-    /// operator. Default: components stay apart.
-    pub join: Option<f64>,
+    /// The operator: discretisation, mass, and the distance at which components are joined. Default: cotangent, lumped,
+    /// components stay apart.
+    pub operator: OperatorOptions,
 }
 
 impl Default for BasisOptions {
     fn default() -> Self {
-        Self { eigenpairs: 500, join: None }
+        Self { eigenpairs: 500, operator: OperatorOptions::default() }
     }
 }
 
@@ -42,8 +43,10 @@ pub struct Basis {
     pub eigenvalues: Vec<f64>,
     /// Φ, K × N, one eigenvector after another, in 1/length.
     pub eigenvectors: Vec<f32>,
-    /// Lumped mass of each vertex, N, in length².
+    /// Lumped mass of each vertex, N, in length²; all 1 with the identity as mass.
     pub mass: Vec<f64>,
+    /// M on vertices, N × N, where it is not diagonal; then `mass` holds the sums of its rows.
+    pub mass_matrix: Option<Csr>,
     /// α⁰ = Φᵀ M p⁰, K × 3, in length².
     pub baseline: Vec<[f64; 3]>,
     /// What is known about it.
@@ -57,6 +60,15 @@ pub struct BasisFacts {
     pub asked: usize,
     /// Distance of the join, if any.
     pub join: Option<f64>,
+    /// Name of the discretisation.
+    #[serde(default = "cotan")]
+    pub operator: String,
+    /// Name of the mass.
+    #[serde(default = "lumped")]
+    pub mass: String,
+    /// What speaks for the tufted operator on this mesh; empty where it was used.
+    #[serde(default)]
+    pub tufted_advice: Vec<String>,
     /// Pairs of vertices that the join made one.
     pub joined_pairs: usize,
     /// Connected components of the mesh.
@@ -86,23 +98,27 @@ pub struct BasisFacts {
     pub close: Vec<(usize, usize)>,
 }
 
+fn cotan() -> String {
+    Kind::default().to_string()
+}
+
+fn lumped() -> String {
+    Mass::default().to_string()
+}
+
 impl Basis {
     /// Computes the eigenbasis of the reference mesh.
     ///
     /// # Errors
     /// [`Error::Join`], [`Error::Operator`], [`Error::Eigen`], [`Error::Stopped`].
     pub fn compute(reference: &Reference, options: &BasisOptions, watch: &dyn Watch) -> Result<Self, Error> {
-        let &BasisOptions { eigenpairs, join } = options;
+        let BasisOptions { eigenpairs, operator: operator_options } = options;
+        let (&eigenpairs, join) = (eigenpairs, operator_options.join);
         if eigenpairs == 0 {
             return Err(Error::Value { name: "-K", value: "0".into(), expected: "at least one eigenpair".into() });
         }
         let inspection = mesh_spectrum::inspect(&reference.mesh);
-        let joined_pairs = join
-            .map(|distance| mesh_spectrum::join(&reference.mesh, distance))
-            .transpose()?
-            .map_or(0, |join| join.pairs);
-        let operator = mesh_spectrum::operator(&reference.mesh, &OperatorOptions { join, ..Default::default() })
-            .map_err(Error::Operator)?;
+        let operator = mesh_spectrum::operator(&reference.mesh, operator_options)?;
         let solved =
             mesh_spectrum::eigenbasis(&operator, &EigenOptions { count: eigenpairs, ..Default::default() }, watch)?;
         let eigenvectors: Vec<f32> = solved.eigenvectors.iter().map(|&x| x as f32).collect();
@@ -110,7 +126,13 @@ impl Basis {
         let facts = BasisFacts {
             asked: eigenpairs,
             join,
-            joined_pairs,
+            operator: operator_options.kind.to_string(),
+            mass: operator_options.mass.to_string(),
+            tufted_advice: match operator_options.kind {
+                Kind::Tufted => Vec::new(),
+                _ => inspection.reasons.iter().map(ToString::to_string).collect(),
+            },
+            joined_pairs: operator.pairs_joined,
             components: inspection.components,
             null_space: solved.certificate.components,
             join_advice: inspection.gap.filter(|_| join.is_none()),
@@ -129,6 +151,7 @@ impl Basis {
             eigenvalues: solved.eigenvalues,
             eigenvectors,
             mass: operator.vertex_mass,
+            mass_matrix: operator.vertex_mass_matrix,
             baseline: Vec::new(),
             facts,
         };
@@ -146,6 +169,21 @@ impl Basis {
         self.mass.len()
     }
 
+    /// M f for a vector function on the vertices, N × 3.
+    pub(crate) fn weigh(&self, values: &[[f64; 3]]) -> Vec<[f64; 3]> {
+        match &self.mass_matrix {
+            Some(matrix) => (0..matrix.rows())
+                .map(|row| {
+                    let add = |sum: [f64; 3], (column, m): (usize, f64)| {
+                        std::array::from_fn(|c| sum[c] + m * values[column][c])
+                    };
+                    matrix.row(row).fold([0.0; 3], add)
+                })
+                .collect(),
+            None => values.iter().zip(&self.mass).map(|(value, m)| value.map(|x| m * x)).collect(),
+        }
+    }
+
     /// One eigenvector, N; `eigenvector` counts from 1 as in the paper.
     pub fn eigenvector(&self, eigenvector: usize) -> &[f32] {
         let n = self.vertices();
@@ -160,7 +198,8 @@ impl Basis {
     }
 }
 
-/// Largest ‖Lφ − λMφ‖ in the M⁻¹ norm over λ_K, on the degrees of freedom of the operator.
+/// Largest ‖Lφ − λMφ‖ in the M⁻¹ norm over λ_K, on the degrees of freedom of the operator. For a mass that is not diagonal
+/// in the norm of its row sums' inverse, which is at most twice as small.
 fn residual(operator: &mesh_spectrum::Operator, eigenvalues: &[f64], eigenvectors: &[f64]) -> f64 {
     let n = operator.vertex_mass.len();
     let mut on_dofs = vec![0.0; operator.mass.len()];
@@ -168,8 +207,12 @@ fn residual(operator: &mesh_spectrum::Operator, eigenvalues: &[f64], eigenvector
         // Vertices that the join made one have the same value.
         operator.dof_of_vertex.iter().zip(phi).for_each(|(&dof, &x)| on_dofs[dof as usize] = x);
         let stiff = operator.stiffness.times(&on_dofs);
-        let square = |((s, m), x): ((&f64, &f64), &f64)| (s - lambda * m * x).powi(2) / m;
-        stiff.iter().zip(&operator.mass).zip(&on_dofs).map(square).sum::<f64>().sqrt()
+        let weighed = match &operator.mass_matrix {
+            Some(mass) => mass.times(&on_dofs),
+            None => operator.mass.iter().zip(&on_dofs).map(|(m, x)| m * x).collect(),
+        };
+        let square = |((s, m), w): ((&f64, &f64), &f64)| (s - lambda * w).powi(2) / m;
+        stiff.iter().zip(&operator.mass).zip(&weighed).map(square).sum::<f64>().sqrt()
     });
     let largest = eigenvalues.last().copied().filter(|&lambda| lambda > 0.0).unwrap_or(1.0);
     residuals.fold(0.0, f64::max) / largest

@@ -73,9 +73,9 @@ pub struct Settings {
     /// Distance of the join; absent when components stay apart.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub join: Option<f64>,
-    /// The operator.
+    /// The operator: `cotan` (`cotangent` in older studies), `tufted` or `polygon`.
     pub operator: String,
-    /// The mass matrix.
+    /// The mass matrix: `lumped`, `consistent` or `identity`.
     pub mass: String,
     /// Unit of lengths: a label, nothing is converted.
     pub length_unit: String,
@@ -135,9 +135,9 @@ impl Study {
             reference_path: absolute(run.path()),
             parts: reference.parts.clone(),
             eigenpairs: options.eigenpairs,
-            join: options.join,
-            operator: "cotangent".into(),
-            mass: "lumped".into(),
+            join: options.operator.join,
+            operator: options.operator.kind.to_string(),
+            mass: options.operator.mass.to_string(),
             length_unit: "mm".into(),
             time_unit: "ms".into(),
         };
@@ -197,7 +197,7 @@ impl Study {
         &self.manifest
     }
 
-    /// Whether the study is what these wishes would make: the same surface, parts, eigenpairs and join.
+    /// Whether the study is what these wishes would make: the same surface, parts, eigenpairs, operator and join.
     ///
     /// # Errors
     /// Those of [`Reference::of_run`] and [`Study::reference`].
@@ -210,7 +210,9 @@ impl Study {
                 && here.mesh.vertices() == reference.mesh.vertices())
         };
         Ok(self.settings.eigenpairs == options.eigenpairs
-            && self.settings.join == options.join
+            && self.settings.join == options.operator.join
+            && self.settings.operator.parse() == Ok(options.operator.kind)
+            && self.settings.mass.parse() == Ok(options.operator.mass)
             && self.settings.parts == reference.parts
             && same_mesh()?)
     }

@@ -25,7 +25,7 @@ pub(super) fn elements(mesh: &Mesh, consistent: bool) -> Result<Elements, Operat
 
 /// cot θ at each corner of a triangle: cot θ = (u·v) / |u×v|, with u and v the edges that leave the corner;
 /// |u×v|, twice the area, is the same at all three corners.
-pub(super) fn cotangents([a, b, c]: [Point; 3], double_area: f64) -> [f64; 3] {
+pub(crate) fn cotangents([a, b, c]: [Point; 3], double_area: f64) -> [f64; 3] {
     let cot = |u, v| dot(u, v) / double_area;
     [cot(sub(b, a), sub(c, a)), cot(sub(c, b), sub(a, b)), cot(sub(a, c), sub(b, c))]
 }

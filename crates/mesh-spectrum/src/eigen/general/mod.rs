@@ -52,7 +52,13 @@ pub(crate) fn eigenbasis(
     };
     let mut solved: Vec<Option<Pairs>> = pencils
         .par_iter_mut()
-        .map(|pencil| if is_dense(pencil) { pencil.solve_dense().map(Some) } else { pencil.prepare().map(|()| None) })
+        .map(|pencil| {
+            if is_dense(pencil) {
+                pencil.solve_dense(count.min(pencil.rows())).map(Some)
+            } else {
+                pencil.prepare().map(|()| None)
+            }
+        })
         .collect::<Result<_, EigenError>>()?;
     let (top, below) = top(&pencils, &solved, count, &progress)?;
     let tolerance = options.tolerance.min(1e-8);
@@ -84,7 +90,11 @@ fn top(
     let dofs: usize = pencils.iter().map(Pencil::rows).sum();
     let wanted = (count + 1).min(dofs);
     if solved.iter().all(Option::is_some) {
-        return Ok((f64::INFINITY, pencils.iter().map(Pencil::rows).collect()));
+        let mut all: Vec<f64> = solved.iter().flatten().flat_map(|pairs| pairs.eigenvalues.iter().copied()).collect();
+        all.sort_by(f64::total_cmp);
+        let top = all[wanted - 1]; // included
+        let below = |pairs: &Pairs| pairs.eigenvalues.iter().filter(|&&e| e <= top).count();
+        return Ok((top, solved.iter().flatten().map(below).collect()));
     }
     let enough = wanted..=(wanted + 4 + count / 40).min(dofs);
     let area: f64 = pencils.iter().map(|pencil| pencil.area).sum();
@@ -146,12 +156,13 @@ fn in_intervals(
             let parts: Vec<_> = borders.par_windows(2).enumerate().map(solve).collect::<Result<Vec<_>, Trouble>>()?;
             let (eigenvalues, vectors): (Vec<Vec<f64>>, Vec<Vec<f64>>) = parts.into_iter().unzip();
             let (mut eigenvalues, mut vectors) = (eigenvalues.concat(), vectors.concat());
-            finish::orthonormalise(pencil, &mut eigenvalues, &mut vectors)?;
+            finish::orthonormalise(pencil, &eigenvalues, &mut vectors)?;
             let found = |shift: f64| eigenvalues.iter().filter(|&&eigenvalue| eigenvalue < shift).count();
             let counts: Vec<_> = borders[1..].iter().map(|&(at, below)| (at, found(at), below)).collect();
             if let Some((at, found, counted)) = counts.iter().find(|(_, found, counted)| found != counted) {
                 return Err(Trouble::Again(format!("{found} eigenvalues found below {at:e}, {counted} counted")));
             }
+            eigenvalues[0] = 0.0; // the null vector's, in closed form
             Ok(Pairs { eigenvalues, vectors, counts, dense: false })
         }) {
             Err(Trouble::Again(seen)) => detail = seen,

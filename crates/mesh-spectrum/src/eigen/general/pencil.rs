@@ -13,6 +13,7 @@ use faer::{Conj, Mat, MatMut, Par, Side};
 
 use super::Pairs;
 use crate::eigen::EigenError;
+use crate::eigen::weyl::Weyl;
 use crate::operator::{Csr, Operator};
 
 /// Growth and pivots (in mean spacings) a shift is used with, as for the diagonal mass.
@@ -160,17 +161,25 @@ impl Pencil {
         best
     }
 
-    /// All pairs: B = G Gᵀ, the eigenvectors y of G⁻¹ A G⁻ᵀ, v = G⁻ᵀ y. Time O(n³).
-    pub(super) fn solve_dense(&self) -> Result<Pairs, EigenError> {
+    /// All pairs: with P = G Gᵀ, the eigenvectors y of G⁻¹ Q G⁻ᵀ, v = G⁻ᵀ y. Time O(n³).
+    ///
+    /// P = B, Q = A gives λ, exact to rounding of the largest eigenvalue. Where that is far above the `wanted`-th, on
+    /// meshes with slivers, P = A + sB, Q = B with s near that one gives 1/(λ + s), exact for the lowest.
+    pub(super) fn solve_dense(&self, wanted: usize) -> Result<Pairs, EigenError> {
         let n = self.rows();
-        let full = |matrix: &Csr| {
-            let mut full = Mat::<f64>::zeros(n, n);
-            (0..n).for_each(|i| matrix.row(i).for_each(|(j, value)| full[(i, j)] = value));
-            full
-        };
-        let failed = |detail: &str| EigenError::NotConverged { found: 0, wanted: n, detail: detail.into() };
-        let g = full(&self.b).llt(Side::Lower).map_err(|_| failed("the mass matrix is not positive definite"))?;
-        let mut c = full(&self.a);
+        let s = Weyl::closed(self.area).inverse(wanted as f64);
+        let inverse = self.norm() > 1e6 * s;
+        let mut c = Mat::<f64>::zeros(n, n);
+        let mut p = Mat::<f64>::zeros(n, n);
+        for i in 0..n {
+            self.a.row(i).for_each(|(j, value)| if inverse { p[(i, j)] += value } else { c[(i, j)] += value });
+            self.b.row(i).for_each(|(j, value)| {
+                p[(i, j)] += if inverse { s * value } else { value };
+                c[(i, j)] += if inverse { value } else { 0.0 };
+            });
+        }
+        let failed = |detail: &str| EigenError::NotConverged { found: 0, wanted, detail: detail.into() };
+        let g = p.llt(Side::Lower).map_err(|_| failed("the mass matrix is not positive definite"))?;
         let lower = |x: MatMut<'_, f64>| {
             faer::linalg::triangular_solve::solve_lower_triangular_in_place(g.L(), x, Par::Seq);
         };
@@ -182,9 +191,12 @@ impl Pencil {
             symmetric.self_adjoint_eigen(Side::Lower).map_err(|_| failed("the dense solver did not converge"))?;
         let mut v = pairs.U().to_owned();
         faer::linalg::triangular_solve::solve_upper_triangular_in_place(g.L().transpose(), v.as_mut(), Par::Seq);
+        let theta = pairs.S().column_vector();
+        let order: Vec<usize> = if inverse { (0..n).rev().collect() } else { (0..n).collect() };
+        let eigenvalue = |&k: &usize| if inverse { 1.0 / theta[k].max(f64::MIN_POSITIVE) - s } else { theta[k] };
         Ok(Pairs {
-            eigenvalues: pairs.S().column_vector().iter().copied().collect(),
-            vectors: (0..n).flat_map(|k| (0..n).map(|i| v[(i, k)]).collect::<Vec<_>>()).collect(),
+            eigenvalues: order.iter().map(eigenvalue).collect(),
+            vectors: order.iter().flat_map(|&k| v.col(k).iter().copied().collect::<Vec<_>>()).collect(),
             counts: Vec::new(),
             dense: true,
         })
