@@ -25,6 +25,9 @@ use pencil::Pencil;
 /// Pairs of an interval.
 const PAIRS: usize = 56;
 
+/// Intervals meet only where the spectrum has a gap of at least this share of the largest eigenvalue.
+const GAP: f64 = 1e-6;
+
 /// The pairs of one component, ascending.
 struct Pairs {
     eigenvalues: Vec<f64>,
@@ -100,26 +103,29 @@ fn top(
     let area: f64 = pencils.iter().map(|pencil| pencil.area).sum();
     let (mut low, mut high) = (0.0, 2.0 * pencils.iter().map(Pencil::norm).fold(0.0, f64::max));
     let mut at = Weyl::closed(area).inverse(wanted as f64).min(0.5 * high);
+    let counts = |at: f64| -> Option<Vec<usize>> {
+        let below = |(pencil, solved): (&Pencil, &Option<Pairs>)| match solved {
+            Some(pairs) => Some(pairs.eigenvalues.iter().filter(|&&e| e < at).count()),
+            None => pencil.factor(at).filter(|factor| factor.pivot_min > 1e-9 * at).map(|factor| factor.below),
+        };
+        pencils.par_iter().zip(solved).map(below).collect()
+    };
     for round in 0..200 {
         if progress.stopped() {
             return Err(EigenError::Stopped);
         }
-        let counts: Option<Vec<usize>> = pencils
-            .par_iter()
-            .zip(solved)
-            .map(|(pencil, solved)| match solved {
-                Some(pairs) => Some(pairs.eigenvalues.iter().filter(|&&e| e < at).count()),
-                None => pencil.factor(at).filter(|factor| factor.pivot_min > 1e-9 * at).map(|factor| factor.below),
-            })
-            .collect();
-        let Some(below) = counts else {
+        let Some(below) = counts(at) else {
             at *= 1.0 + 1e-5; // on an eigenvalue, to rounding
             continue;
         };
         let total = below.iter().sum::<usize>();
         // A bracket this narrow holds a cluster: take it whole.
         if enough.contains(&total) || (total >= wanted && high - low < 1e-7 * high) {
-            return Ok((at, below));
+            return in_a_gap(counts, at, GAP * at, f64::INFINITY).ok_or_else(|| EigenError::NotConverged {
+                found: 0,
+                wanted: count,
+                detail: format!("no gap in the spectrum above {at:e}"),
+            });
         }
         if total < wanted {
             low = at
@@ -135,6 +141,22 @@ fn top(
     }
     let detail = format!("no shift counts {wanted} eigenvalues, between {low:e} and {high:e}");
     Err(EigenError::NotConverged { found: 0, wanted: count, detail })
+}
+
+/// The first value from `at` on, below `limit`, around which there is no eigenvalue within half of `gap`, and the counts
+/// there. A border inside a cluster would give each side its own vectors of one eigenspace.
+fn in_a_gap<T: PartialEq>(counts: impl Fn(f64) -> Option<T>, at: f64, gap: f64, limit: f64) -> Option<(f64, T)> {
+    let (mut at, mut step) = (at, gap);
+    for _ in 0..60 {
+        if at + gap >= limit {
+            return None;
+        }
+        match (counts(at), counts(at + gap)) {
+            (Some(low), Some(high)) if low == high => return Some((at + 0.5 * gap, low)),
+            _ => (at, step) = (at + step, 1.5 * step),
+        }
+    }
+    None
 }
 
 /// The `count` pairs of a component below `top`, interval by interval.
@@ -184,17 +206,14 @@ fn intervals(
     let weyl = Weyl::through(pencil.area, top, count as f64);
     let wanted = count.div_ceil(PAIRS) + attempt;
     let guesses: Vec<f64> = (1..wanted).map(|k| weyl.inverse((k * count) as f64 / wanted as f64)).collect();
-    let at = |shift: f64| -> Result<(f64, usize), Trouble> {
+    let at = |shift: f64| -> Result<Option<(f64, usize)>, Trouble> {
         if progress.stopped() {
             return Err(EigenError::Stopped.into());
         }
-        let factor = pencil
-            .factor_near(shift, top / count as f64)
-            .ok_or_else(|| Trouble::Again(format!("no factorisation near {shift:e}")))?;
-        Ok((factor.shift, factor.below))
+        Ok(in_a_gap(|at| pencil.factor(at).map(|factor| factor.below), shift, GAP * top, top))
     };
     let mut borders = vec![(f64::NEG_INFINITY, 0), (top, count)];
-    borders.extend(guesses.into_par_iter().map(at).collect::<Result<Vec<_>, _>>()?);
+    borders.extend(guesses.into_par_iter().map(at).collect::<Result<Vec<_>, _>>()?.into_iter().flatten());
     for _ in 0..8 {
         borders.sort_by(|a, b| a.0.total_cmp(&b.0));
         // Where Weyl's law was too far off, halve the interval.
@@ -206,7 +225,7 @@ fn intervals(
         if more.is_empty() {
             break;
         }
-        borders.extend(more.into_par_iter().map(at).collect::<Result<Vec<_>, _>>()?);
+        borders.extend(more.into_par_iter().map(at).collect::<Result<Vec<_>, _>>()?.into_iter().flatten());
     }
     borders.sort_by(|a, b| a.0.total_cmp(&b.0));
     borders.retain(|&(at, _)| at <= top);
