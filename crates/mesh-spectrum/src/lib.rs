@@ -4,6 +4,9 @@
 //! [`operator`] builds stiffness and mass, with separate sheets [joined](join()) where asked for; [`eigenbasis`] finds the
 //! K lowest pairs of L φ = λ M φ and the evidence that they are right and that none is missing.
 //!
+//! `examples/obj_to_eigenpairs.rs` starts from a mesh file and prints pairs with their residuals. Quadrilaterals and
+//! non-manifold or badly shaped meshes have operators of their own, see [`Kind`]; [`inspect`] recommends one.
+//!
 //! The spectrum of a sheet of 2 × 1 with a free boundary is λ = π² (p²/4 + q²):
 //!
 //! ```
