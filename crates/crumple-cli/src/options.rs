@@ -201,7 +201,8 @@ fn numbers(text: &str) -> Result<Vec<usize>, Error> {
         value: text.to_owned(),
         expected: "numbers from 1 and ranges of them, as 3,5,8-12".into(),
     };
-    let number = |text: &str| text.trim().parse::<usize>().ok().filter(|&j| (1..=1_000_000).contains(&j)).ok_or_else(wrong);
+    let number =
+        |text: &str| text.trim().parse::<usize>().ok().filter(|&j| (1..=1_000_000).contains(&j)).ok_or_else(wrong);
     let mut all = Vec::new();
     for item in text.split(',') {
         let (first, last) = match item.split_once('-') {

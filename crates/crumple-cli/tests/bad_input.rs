@@ -85,7 +85,7 @@ fn a_study_of_another_layout() {
     manifest["layout"] = 999.into();
     std::fs::write(&path, manifest.to_string()).unwrap();
     for (_, words) in commands_on(&own.study(), own.around()) {
-        untouched(&own, || ask(&words)).refused(&["study", "layout 999", "layout 1"]).hints("version");
+        untouched(&own, || ask(&words)).refused(&["study", "layout 999", "layout 2"]).hints("version");
     }
 }
 

@@ -99,7 +99,8 @@ fn coefficient_columns(rows: &Coefficients) -> Vec<(String, Column)> {
     for (at, &j) in rows.eigenvectors.iter().enumerate() {
         let components = rows.function.components();
         for component in 0..components {
-            let values = (0..rows.rows()).map(|row| Some(f64::from(rows.row(row)[components * at + component]))).collect();
+            let values =
+                (0..rows.rows()).map(|row| Some(f64::from(rows.row(row)[components * at + component]))).collect();
             columns.push((column_name(rows.function, j, component), Column::Number(values)));
         }
     }

@@ -5,67 +5,12 @@
 //! whole ([`crate::rotation::Ruler`]). Search, verify, classify, monitor and the optimiser's number compare these
 //! numbers and nothing else.
 
-use std::str::FromStr;
-
-use serde::{Deserialize, Serialize};
-
 use crate::Error;
 use crate::basis::Basis;
 use crate::descriptor::{Descriptor, Selected};
 use crate::rotation::Ruler;
-use crate::select::Select;
-use crate::study::{Coefficients, Function, Rows, Study, column_name, triples};
-
-/// Which numbers say how a state deformed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Kind {
-    /// The spectrum of the rotation field: what kind of deformation it is wherever it happens, and which way it goes.
-    #[default]
-    Rotation,
-    /// The paper's: coefficients on the eigenvectors that matter most for the target.
-    Paper,
-}
-
-impl Kind {
-    /// As a word.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Rotation => "rotation",
-            Self::Paper => "paper",
-        }
-    }
-}
-
-impl FromStr for Kind {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self, Error> {
-        match text {
-            "rotation" => Ok(Self::Rotation),
-            "paper" => Ok(Self::Paper),
-            _ => Err(Error::Value { name: "--kind", value: text.into(), expected: "rotation or paper".into() }),
-        }
-    }
-}
-
-/// Coefficients that a comparison reads: all K of a function, or those of some eigenvectors.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Need {
-    /// What was projected.
-    pub function: Function,
-    /// Eigenvectors, counted from 1; all when `None`.
-    pub eigenvectors: Option<Vec<usize>>,
-}
-
-/// Stored coefficients of one function in one state.
-#[derive(Debug, Clone, Copy)]
-pub struct Stored<'a> {
-    /// Coefficients, as the need says.
-    pub values: &'a [f32],
-    /// Root mean square of the whole function over the surface; 0 for fields.
-    pub rms: f64,
-}
+use crate::select::{Kind, Select};
+use crate::study::{Coefficients, Function, Need, Rows, Stored, Study, column_name, triples};
 
 /// From coefficients to the numbers that are compared.
 #[derive(Debug, Clone)]

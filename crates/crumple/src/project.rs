@@ -182,7 +182,13 @@ impl<'a> Projector<'a> {
         if let Some(last) = states.last() {
             warnings.extend(last.measures.warnings());
         }
-        Ok(Projected { run: run.id().to_owned(), states, content: hash.finalize().to_hex().to_string(), warnings, spent })
+        Ok(Projected {
+            run: run.id().to_owned(),
+            states,
+            content: hash.finalize().to_hex().to_string(),
+            warnings,
+            spent,
+        })
     }
 
     /// Projects one state of a run that may still be growing.
@@ -216,7 +222,7 @@ impl<'a> Projector<'a> {
             hash.update(&bytes);
             shapes.push(shape);
             for (field, values) in self.fields.iter().zip(&mut quantities) {
-                values.push(field.on_surface(run, reference, placement, state)?);
+                values.push(reference.field(run, placement, *field, state)?);
             }
         }
         clock.lap(&mut spent.reading);
@@ -230,7 +236,10 @@ impl<'a> Projector<'a> {
             .map(|shape| rotation::field(reference.mesh.triangles(), reference.mesh.vertices(), shape))
             .collect();
         let rotations = coefficients_of(basis, &turned);
-        measures.iter_mut().zip(&turned).for_each(|(measures, turned)| measures.turn = geometry.mean_square(turned).sqrt());
+        measures
+            .iter_mut()
+            .zip(&turned)
+            .for_each(|(measures, turned)| measures.turn = geometry.mean_square(turned).sqrt());
         clock.lap(&mut spent.rotation);
         let quantities: Vec<Vec<Vec<Vector>>> =
             quantities.iter().map(|values| coefficients_of(basis, values)).collect();

@@ -9,8 +9,9 @@ use std::collections::HashMap;
 use mesh_spectrum::Mesh;
 
 use crate::Error;
-use crate::run::Run;
-use crate::vector::{Vector, distance, double_area};
+use crate::field::Field;
+use crate::run::{FieldValues, Run};
+use crate::vector::{Vector, area, distance, double_area};
 
 /// The surface, with what is needed to find it again in another run.
 #[derive(Debug, Clone)]
@@ -97,8 +98,11 @@ impl Reference {
             })
             .collect::<Result<_, _>>()?;
         let ids = run.node_ids();
-        let there: HashMap<FaceKey, u32> =
-            run.faces().zip(0..).map(|((face, _), shell)| (face_key(face.map(|node| ids[node as usize])), shell)).collect();
+        let there: HashMap<FaceKey, u32> = run
+            .faces()
+            .zip(0..)
+            .map(|((face, _), shell)| (face_key(face.map(|node| ids[node as usize])), shell))
+            .collect();
         let mut shell_of_triangle = Vec::with_capacity(self.mesh.triangles().len());
         for (key, triangles) in self.face_keys() {
             let Some(&shell) = there.get(&key) else {
@@ -134,6 +138,42 @@ impl Reference {
             });
         }
         Ok(shape)
+    }
+
+    /// A field on the vertices in one state of a run, N × 3; scalars have their value in the first place and zeros behind
+    /// it. Values of shells go to the vertices by area: f_v = Σ A_t f_t / Σ A_t over the triangles t at v.
+    ///
+    /// # Errors
+    /// [`Error::NoField`] where the run does not carry it, [`Error::FieldNotFinite`], reading errors.
+    pub fn field(&self, run: &Run, placement: &Placement, field: Field, state: usize) -> Result<Vec<[f64; 3]>, Error> {
+        let values = match run.field(field, state)? {
+            FieldValues::Nodes(values) => placement.node_of_vertex.iter().map(|&node| values[node as usize]).collect(),
+            FieldValues::Shells(values) => self.to_vertices(placement, &values),
+        };
+        if values.as_flattened().iter().all(|x| x.is_finite()) {
+            return Ok(values);
+        }
+        Err(Error::FieldNotFinite {
+            run: run.id().to_owned(),
+            field: field.to_string(),
+            state,
+            time: run.times()[state],
+        })
+    }
+
+    /// Means of the values of the shells around each vertex, weighted by area.
+    fn to_vertices(&self, placement: &Placement, values: &[f64]) -> Vec<[f64; 3]> {
+        let mut sums = vec![[0.0; 3]; self.vertices()];
+        let mut areas = vec![0.0; self.vertices()];
+        for (triangle, &shell) in self.mesh.triangles().iter().zip(&placement.shell_of_triangle) {
+            let area = area(triangle.map(|vertex| self.mesh.vertices()[vertex as usize]));
+            for &vertex in triangle {
+                sums[vertex as usize][0] += area * values[shell as usize];
+                areas[vertex as usize] += area;
+            }
+        }
+        sums.iter_mut().zip(&areas).filter(|(_, area)| **area > 0.0).for_each(|(sum, area)| sum[0] /= area);
+        sums
     }
 
     /// The input faces in order, each by its node ids, with the number of its triangles; a quad is put together again
@@ -180,7 +220,8 @@ fn choose_parts(run: &Run, all: &[crate::run::Part], asked: &[String]) -> Result
 }
 
 fn has_area(points: &[[f64; 3]], &[a, b, c, d]: &[u32; 4]) -> bool {
-    let no_area = |a: u32, b: u32, c: u32| double_area([a, b, c].map(|node| points[node as usize])) == Vector::default();
+    let no_area =
+        |a: u32, b: u32, c: u32| double_area([a, b, c].map(|node| points[node as usize])) == Vector::default();
     // A coordinate that is not a number is left for the mesh to name.
     !(no_area(a, b, c) && no_area(a, c, d))
 }

@@ -12,8 +12,9 @@ use serde::Serialize;
 
 use crate::Error;
 use crate::descriptor::Descriptor;
-use crate::features::{Features, Kind, Samples, Stored};
-use crate::study::{Loaded, Rows};
+use crate::features::{Features, Samples};
+use crate::select::Kind;
+use crate::study::{Loaded, Rows, Stored};
 use crate::target::Target;
 
 /// What is compared, and how.

@@ -6,12 +6,11 @@ use std::path::Path;
 use crate::Error;
 use crate::basis::coefficients;
 use crate::bundle;
-use crate::features::Need;
 use crate::field::Field;
 use crate::project::{ProjectedState, project};
 use crate::rotation;
 use crate::run::Run;
-use crate::study::{Function, Loaded, Rows, Study, triples};
+use crate::study::{Function, Loaded, Need, Rows, Study, triples};
 use crate::vector::{Vector, subtract};
 
 /// A run and a state as they were written.
@@ -107,7 +106,9 @@ impl Target {
             Function::Rotation => Ok(narrow(&self.rotation)),
             Function::Field(asked) => {
                 let found = self.fields.iter().find(|(field, _)| *field == asked);
-                found.map(|(_, values)| values.clone()).ok_or_else(|| unknown_field(asked, self.fields.iter().map(|(field, _)| *field)))
+                found
+                    .map(|(_, values)| values.clone())
+                    .ok_or_else(|| unknown_field(asked, self.fields.iter().map(|(field, _)| *field)))
             }
         }
     }
@@ -188,12 +189,7 @@ pub fn shape(loaded: &Loaded, named: &Named, target: &Target) -> Result<Vec<[f64
 ///
 /// # Errors
 /// As [`shape`], and [`Error::NoField`].
-pub fn on_surface(
-    loaded: &Loaded,
-    named: &Named,
-    target: &Target,
-    function: Function,
-) -> Result<Vec<[f64; 3]>, Error> {
+pub fn on_surface(loaded: &Loaded, named: &Named, target: &Target, function: Function) -> Result<Vec<[f64; 3]>, Error> {
     let Loaded { study, reference, basis, .. } = loaded;
     let run = match study.manifest().runs.get(&named.run) {
         Some(record) => Run::open(&named.run, &record.path)?,
@@ -216,7 +212,7 @@ pub fn on_surface(
     match function {
         Function::Displacement => Ok(shape),
         Function::Rotation => Ok(rotation::field(reference.mesh.triangles(), reference.mesh.vertices(), &shape)),
-        Function::Field(field) => field.on_surface(&run, reference, &placement, target.state),
+        Function::Field(field) => reference.field(&run, &placement, field, target.state),
     }
 }
 

@@ -171,7 +171,7 @@ fn a_manifest_edited_by_hand_never_panics() {
             text.replacen("\"part\": \"coefficients/", "\"part\": \"coefficients/x", 1)
         }),
         ("another basis", |text| text.replacen("\"basis\": \"", "\"basis\": \"f", 1)),
-        ("another layout", |text| text.replacen("\"layout\": 1", "\"layout\": 2", 1)),
+        ("another layout", |text| text.replacen("\"layout\": 2", "\"layout\": 3", 1)),
         ("a path that is gone", |text| text.replace("/d3plot\"", "/d4plot\"")),
     ];
     let mut passed_over = Vec::new();

@@ -86,7 +86,10 @@ fn descriptors_of_real_runs_find_their_runs() {
         for select in [Select::Coordinates, Select::Difference] {
             let made = described(&loaded, run, select, Threshold::default());
             let descriptor = &made.descriptor;
-            assert!(!descriptor.selected.eigenvectors.is_empty() && descriptor.selected.eigenvectors.len() < 40, "{descriptor:?}");
+            assert!(
+                !descriptor.selected.eigenvectors.is_empty() && descriptor.selected.eigenvectors.len() < 40,
+                "{descriptor:?}"
+            );
             // One standard deviation above the mean, over all 3K magnitudes.
             let kept = |j: usize| made.values[j - 1].iter().any(|x: &f64| x.abs() > descriptor.selected.threshold);
             assert!((1..=120).all(|j| kept(j) == descriptor.selected.eigenvectors.contains(&j)));

@@ -6,9 +6,9 @@
 mod world;
 
 use crumple::descriptor::{DescribeOptions, Select, Threshold, describe};
-use crumple::features::Kind;
 use crumple::modes::{By, Method, ModesOptions, load, modes, save};
 use crumple::report::{describe_modes, findings, page};
+use crumple::select::Kind;
 use crumple::similarity::{Metric, SimilarityOptions, Weight, search};
 use crumple::study::{AddOptions, Function, Loaded, Rows, Study, check};
 use crumple::target::Named;

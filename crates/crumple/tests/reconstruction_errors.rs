@@ -86,7 +86,8 @@ fn errors_fall_as_more_is_kept() {
     for run in ["run_0", "run_4"] {
         let (target, original) = target(&loaded, run);
         for select in [Select::Coordinates, Select::Difference] {
-            let by_rule = |m: usize| described(&loaded, run, select, Threshold::Top(m)).descriptor.selected.errors.unwrap().rms;
+            let by_rule =
+                |m: usize| described(&loaded, run, select, Threshold::Top(m)).descriptor.selected.errors.unwrap().rms;
             let first = |m: usize| {
                 let kept: Vec<usize> = (1..=m).collect();
                 errors_of(&loaded, select, &kept, &target, &original).rms
@@ -125,7 +126,8 @@ fn the_triples_of_largest_energy_are_the_best_choice_of_m() {
             // The paper's rule on δ; its null space is its own, so that it has at least as many left out as `best`.
             let paper = described(&loaded, run, Select::Difference, Threshold::Top(m)).descriptor;
             let left_out = |rms: f64| (rms * rms - all * all).max(0.0);
-            let kept: Vec<usize> = paper.selected.eigenvectors.iter().copied().filter(|j| !always.contains(j)).collect();
+            let kept: Vec<usize> =
+                paper.selected.eigenvectors.iter().copied().filter(|j| !always.contains(j)).collect();
             let best_of_same_size = left_out(rms(&by_energy[..kept.len()]));
             assert!(
                 left_out(paper.selected.errors.unwrap().rms) <= 3.0 * best_of_same_size + 1e-3,
@@ -157,7 +159,12 @@ fn the_paper_s_rule_may_lose_to_the_best_choice() {
     assert_eq!(found.selected.eigenvectors, [4]);
     let (target, original) = target(&loaded, "run");
     let three = errors_of(&loaded, Select::Difference, &[3], &target, &original);
-    assert!(three.rms < found.selected.errors.unwrap().rms, "{} against {}", three.rms, found.selected.errors.unwrap().rms);
+    assert!(
+        three.rms < found.selected.errors.unwrap().rms,
+        "{} against {}",
+        three.rms,
+        found.selected.errors.unwrap().rms
+    );
 }
 
 #[test]

@@ -316,8 +316,14 @@ fn a_stopped_add_keeps_what_is_finished_even_beside_a_bad_run() {
 fn a_stopped_init_leaves_nothing() {
     let world = bundle(1);
     let options = crumple::basis::BasisOptions { eigenpairs: 6, join: None };
-    let stopped =
-        Study::create(&world.path("study"), &world.open("run_000"), &[], &[], &options, &Stopping(AtomicUsize::new(0), 0));
+    let stopped = Study::create(
+        &world.path("study"),
+        &world.open("run_000"),
+        &[],
+        &[],
+        &options,
+        &Stopping(AtomicUsize::new(0), 0),
+    );
     assert!(matches!(stopped, Err(Error::Stopped)), "{stopped:?}");
     let left: Vec<_> = std::fs::read_dir(world.path("")).unwrap().map(|entry| entry.unwrap().file_name()).collect();
     assert_eq!(left, ["runs"]);

@@ -71,10 +71,18 @@ fn every_rule_keeps_exactly_what_passes_and_completes_triples() {
             let t = found.descriptor.selected.threshold;
             for j in 1..=loaded.basis.eigenpairs() {
                 let passes = found.values[j - 1].iter().any(|x| x.abs() > t);
-                assert_eq!(found.descriptor.selected.eigenvectors.contains(&j), passes, "{select:?} {rule}, eigenvector {j}");
+                assert_eq!(
+                    found.descriptor.selected.eigenvectors.contains(&j),
+                    passes,
+                    "{select:?} {rule}, eigenvector {j}"
+                );
             }
-            let values: Vec<Point> = found.descriptor.selected.eigenvectors.iter().map(|&j| found.values[j - 1]).collect();
-            assert_eq!(found.descriptor.selected.values.iter().map(|value| [value[0], value[1], value[2]]).collect::<Vec<_>>(), values);
+            let values: Vec<Point> =
+                found.descriptor.selected.eigenvectors.iter().map(|&j| found.values[j - 1]).collect();
+            assert_eq!(
+                found.descriptor.selected.values.iter().map(|value| [value[0], value[1], value[2]]).collect::<Vec<_>>(),
+                values
+            );
         }
         let magnitudes: Vec<f64> =
             described(&loaded, "run_2", select, Threshold::Std(1.0)).values.iter().flatten().map(|x| x.abs()).collect();

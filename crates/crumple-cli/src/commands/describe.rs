@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use clap::Args;
 use crumple::Error;
 use crumple::descriptor::{self, Descriptor, Selected, Set};
-use crumple::features::Kind;
 use crumple::modes;
 use crumple::reconstruct::Errors;
+use crumple::select::Kind;
 use crumple::study::Loaded;
 use crumple::target::Named;
 use serde_json::{Value, json};
@@ -102,13 +102,19 @@ fn function_word(selected: &Selected) -> String {
 fn words(descriptor: &Descriptor, unit: &str) -> String {
     let what = match (&descriptor.mode, descriptor.set) {
         (Some(mode), Set::Mean) => format!("the mean of {mode}"),
-        (Some(mode), Set::Share(share)) => format!("what matters for {:.0} % of {mode}, with the values of {}", 100.0 * share, descriptor.run),
+        (Some(mode), Set::Share(share)) => {
+            format!("what matters for {:.0} % of {mode}, with the values of {}", 100.0 * share, descriptor.run)
+        }
         _ => format!("{} at time {}", descriptor.run, time(descriptor.time)),
     };
-    let mut text = format!("descriptor '{}' of {what}, compared by its {}\n", descriptor.name, match descriptor.kind {
-        Kind::Rotation => "rotation spectrum (--kind paper: by the coefficients below)",
-        Kind::Paper => "coefficients",
-    });
+    let mut text = format!(
+        "descriptor '{}' of {what}, compared by its {}\n",
+        descriptor.name,
+        match descriptor.kind {
+            Kind::Rotation => "rotation spectrum (--kind paper: by the coefficients below)",
+            Kind::Paper => "coefficients",
+        }
+    );
     for selected in descriptor.blocks() {
         text += &selected_words(selected, unit);
     }
@@ -145,7 +151,13 @@ fn selected_words(selected: &Selected, unit: &str) -> String {
     let own = selected.errors.iter().map(|errors| row("descriptor", m, errors));
     let rivals = selected.rivals.iter().map(|rival| row(&rival.method, rival.size, &rival.errors));
     text += &table(
-        &["reconstruction", "#size", &format!("#RMS error{errors_unit}"), &format!("#largest{errors_unit}"), "#of the whole"],
+        &[
+            "reconstruction",
+            "#size",
+            &format!("#RMS error{errors_unit}"),
+            &format!("#largest{errors_unit}"),
+            "#of the whole",
+        ],
         own.chain(rivals),
     );
     if !selected.split_clusters.is_empty() {

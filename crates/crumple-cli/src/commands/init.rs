@@ -40,8 +40,7 @@ impl Init {
         };
         let run = Run::open(&only.id, &only.path)?;
         let basis = &self.basis;
-        let study =
-            Study::create(&self.study, &run, &basis.parts, &basis.fields()?, &basis.options(), watch)?;
+        let study = Study::create(&self.study, &run, &basis.parts, &basis.fields()?, &basis.options(), watch)?;
         let loaded = Loaded::of(study)?;
         let facts = facts(&loaded);
         output.print(&facts, || words(&loaded));

@@ -17,10 +17,10 @@ pub use file::{forget_modes, list, load, save};
 pub use subject::Set;
 pub use threshold::{Selection, Threshold};
 
-use crate::features::Kind;
 use crate::field::Field;
 use crate::reconstruct::Errors;
 use crate::rotation::RotationSpectrum;
+use crate::select::Kind;
 pub use crate::select::Select;
 use crate::study::Function;
 

@@ -18,8 +18,9 @@ use crate::vector::{Vector, square};
 /// Octaves of frequency, from Weyl's count 1 to 512: about the paper's 500 eigenvectors.
 pub const OCTAVES: usize = 9;
 
-/// A root mean square of sin θ below this is rounding of single-precision files, not a turn.
-const TURN_MIN: f64 = 1e-6;
+/// A root mean square of sin θ below this is rounding of single-precision files, not a turn: positions 3 m from the
+/// origin are rounded to 5e-5 of a shell of 5 mm.
+const TURN_MIN: f64 = 1e-4;
 
 /// Kind and direction of a deformation in a few numbers.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -75,7 +76,11 @@ impl Ruler {
         let null_space = basis.facts.null_space;
         let logs: Vec<f64> = (0..)
             .zip(&basis.eigenvalues)
-            .map(|(j, eigenvalue)| if j < null_space || *eigenvalue <= 0.0 { f64::NEG_INFINITY } else { log(eigenvalue) })
+            .map(
+                |(j, eigenvalue)| {
+                    if j < null_space || *eigenvalue <= 0.0 { f64::NEG_INFINITY } else { log(eigenvalue) }
+                },
+            )
             .collect();
         let above = |log: &f64| std::array::from_fn(|octave| (octave as f64 + 1.0 - log).clamp(0.0, 1.0));
         // The longest half wave that fits into the part: λ = (π / ℓ)².

@@ -18,7 +18,6 @@ use parquet::file::reader::ChunkReader;
 use super::{Manifest, store};
 use crate::Error;
 use crate::error::io;
-use crate::features::Stored;
 use crate::field::Field as Quantity;
 use crate::project::{Measures, Projected, ProjectedState};
 
@@ -72,6 +71,24 @@ impl Function {
             }
         }
     }
+}
+
+/// Coefficients that a comparison reads: all K of a function, or those of some eigenvectors.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Need {
+    /// What was projected.
+    pub function: Function,
+    /// Eigenvectors, counted from 1; all when `None`.
+    pub eigenvectors: Option<Vec<usize>>,
+}
+
+/// Stored coefficients of one function in one state.
+#[derive(Debug, Clone, Copy)]
+pub struct Stored<'a> {
+    /// Coefficients, as the need says.
+    pub values: &'a [f32],
+    /// Root mean square of the whole function over the surface; 0 for fields.
+    pub rms: f64,
 }
 
 /// Rows of coefficients, sorted by run and state.
@@ -265,8 +282,13 @@ pub(crate) fn read_part<R: ChunkReader + 'static>(
     let rms = function.rms_column();
     let facts: Vec<&str> = ["run", "state", "time"].into_iter().chain(rms).collect();
     let names = facts.iter().map(|name| (*name).to_owned());
-    let names: Vec<String> =
-        names.chain(into.eigenvectors.iter().flat_map(|&j| (0..function.components()).map(move |c| column_name(function, j, c)))).collect();
+    let names: Vec<String> = names
+        .chain(
+            into.eigenvectors
+                .iter()
+                .flat_map(|&j| (0..function.components()).map(move |c| column_name(function, j, c))),
+        )
+        .collect();
     let schema = builder.parquet_schema();
     let by_name: std::collections::HashMap<&str, usize> =
         schema.columns().iter().zip(0..).map(|(column, leaf)| (column.name(), leaf)).collect();
@@ -285,7 +307,9 @@ pub(crate) fn read_part<R: ChunkReader + 'static>(
         let states = column("state")?.as_primitive_opt::<UInt32Type>().ok_or_else(|| wrong("state"))?.values();
         let times = column("time")?.as_primitive_opt::<Float64Type>().ok_or_else(|| wrong("time"))?.values();
         let rms = rms
-            .map(|name| Ok::<_, Error>(column(name)?.as_primitive_opt::<Float64Type>().ok_or_else(|| wrong(name))?.values()))
+            .map(|name| {
+                Ok::<_, Error>(column(name)?.as_primitive_opt::<Float64Type>().ok_or_else(|| wrong(name))?.values())
+            })
             .transpose()?;
         let values: Vec<&[f32]> = names[facts.len()..]
             .iter()

@@ -37,7 +37,7 @@ use serde::{Deserialize, Serialize};
 pub use add::{AddOptions, Added};
 pub use check::{Checkup, check};
 pub(crate) use coefficients::triples;
-pub use coefficients::{Coefficients, Function, column_name};
+pub use coefficients::{Coefficients, Function, Need, Stored, column_name};
 pub use loaded::Loaded;
 pub use manifest::{FileRecord, LAYOUT, Manifest, RunRecord};
 pub use mesh_file::write_shape;
@@ -211,13 +211,7 @@ impl Study {
     ///
     /// # Errors
     /// Those of [`Reference::of_run`] and [`Study::reference`].
-    pub fn is_for(
-        &self,
-        run: &Run,
-        parts: &[String],
-        fields: &[Field],
-        options: &BasisOptions,
-    ) -> Result<bool, Error> {
+    pub fn is_for(&self, run: &Run, parts: &[String], fields: &[Field], options: &BasisOptions) -> Result<bool, Error> {
         let reference = Reference::of_run(run, parts)?;
         let same_mesh = || -> Result<bool, Error> {
             let here = self.reference()?;

@@ -13,9 +13,9 @@ use std::path::{Path, PathBuf};
 
 use crumple::basis::BasisOptions;
 use crumple::bundle::{self, Found};
-use crumple::features::Kind;
 use crumple::descriptor::{DescribeOptions, Described, Select, Threshold, describe};
 use crumple::run::Run;
+use crumple::select::Kind;
 use crumple::study::{AddOptions, Added, Loaded, Study};
 use crumple::target::Named;
 use proptest::test_runner::{Config, RngSeed};
@@ -391,7 +391,14 @@ impl World {
 
 /// The descriptor of the last state of a run.
 pub fn described(loaded: &Loaded, run: &str, select: Select, threshold: Threshold) -> Described {
-    describe(loaded, &Named::parse(run), None, Some(run), &DescribeOptions { kind: Kind::Paper, select, threshold, ..Default::default() }).unwrap()
+    describe(
+        loaded,
+        &Named::parse(run),
+        None,
+        Some(run),
+        &DescribeOptions { kind: Kind::Paper, select, threshold, ..Default::default() },
+    )
+    .unwrap()
 }
 
 // ---- numbers ------------------------------------------------------------------------------------------------------
