@@ -40,6 +40,8 @@ const STAGES: &[&str] = &[
     "descriptor",
     "features",
     "similarity",
+    "calibrate",
+    "classify",
     "compare",
     "export",
     "report",

@@ -66,6 +66,16 @@ impl Features {
         }
     }
 
+    /// All coefficients of the displacement.
+    pub fn displacement(basis: &Basis) -> Self {
+        let all = 3 * basis.eigenpairs();
+        let frequencies = basis.eigenvalues.iter().flat_map(|eigenvalue| [eigenvalue.max(0.0).sqrt(); 3]).collect();
+        Self {
+            needs: vec![Need { function: Function::Displacement, eigenvectors: None }],
+            blocks: vec![Block::Values { offset: vec![0.0; all], scale: 1.0, frequencies }],
+        }
+    }
+
     /// What has to be read, one entry for each slice that [`Features::vector`] takes.
     pub fn needs(&self) -> &[Need] {
         &self.needs
@@ -105,11 +115,13 @@ impl Features {
     /// Names of the numbers, stable: the names of the study's columns, or `kind_1` …, `turn_1_x` ….
     pub fn names(&self) -> Vec<String> {
         let of = |(block, need): (&Block, &Need)| match block {
-            Block::Values { .. } => {
+            Block::Values { offset, .. } => {
                 let components = need.function.components();
-                let eigenvectors = need.eigenvectors.iter().flatten();
+                let all = || (1..=offset.len() / components).collect();
+                let eigenvectors: Vec<usize> = need.eigenvectors.clone().unwrap_or_else(all);
                 eigenvectors
-                    .flat_map(|&j| (0..components).map(move |c| (j, c)))
+                    .into_iter()
+                    .flat_map(|j| (0..components).map(move |c| (j, c)))
                     .map(|(j, c)| column_name(need.function, j, c))
                     .collect()
             }

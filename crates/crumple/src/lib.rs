@@ -21,6 +21,8 @@
 //! | the coefficients that matter | [`descriptor`] | one state | [`descriptor::Descriptor`] |
 //! | the numbers that are compared | [`features`] | a descriptor, coefficients | a few numbers |
 //! | how alike | [`similarity`] | a descriptor, coefficients | a ranking |
+//! | from which similarity on | [`calibrate`] | a descriptor, known runs | a threshold, its error rates |
+//! | which mode, or none | [`classify`] | modes, a state | [`classify::Verdict`] |
 //! | judged against labels | [`compare`] | labels | precision, average precision |
 //! | tables and arrays for others | [`export`] | a study | npy, CSV, Parquet, OBJ, STL |
 //! | one page for a person | [`report`] | a study | HTML |
@@ -29,6 +31,8 @@
 
 pub mod basis;
 pub mod bundle;
+pub mod calibrate;
+pub mod classify;
 pub mod compare;
 pub mod descriptor;
 mod error;

@@ -159,16 +159,29 @@ impl Comparer {
     /// # Errors
     /// [`Error::UnknownField`] if it lacks what is compared.
     pub fn score_target(&self, target: &Target) -> Result<Score, Error> {
+        let numbers = self.numbers(target)?;
+        Ok(self.score_numbers(numbers))
+    }
+
+    /// The numbers of a state that was named or projected, as they are compared but for centring and weights.
+    ///
+    /// # Errors
+    /// [`Error::UnknownField`] if it lacks what is compared.
+    pub fn numbers(&self, target: &Target) -> Result<Vec<f64>, Error> {
         let needs = self.features.needs();
         let values: Vec<Vec<f32>> = needs.iter().map(|need| target.on(need)).collect::<Result<_, _>>()?;
         let stored: Vec<Stored<'_>> =
             needs.iter().zip(&values).map(|(need, values)| Stored { values, rms: target.rms(need.function) }).collect();
-        Ok(self.score(&stored))
+        Ok(self.features.vector(&stored))
     }
 
     /// Compares one state. `stored`: one entry for each of [`Features::needs`].
     pub fn score(&self, stored: &[Stored<'_>]) -> Score {
-        let value = self.transform(self.features.vector(stored));
+        self.score_numbers(self.features.vector(stored))
+    }
+
+    fn score_numbers(&self, numbers: Vec<f64>) -> Score {
+        let value = self.transform(numbers);
         match self.metric {
             Metric::Cosine => {
                 let similarity = cosine(&self.target, &value);
@@ -251,6 +264,15 @@ pub fn cosine(a: &[f64], b: &[f64]) -> f64 {
         bb += y * y;
     }
     (ab / (aa * bb).sqrt()).clamp(-1.0, 1.0)
+}
+
+/// Of length 1; a zero vector stays zero.
+pub(crate) fn unit(mut numbers: Vec<f64>) -> Vec<f64> {
+    let length = norm(&numbers);
+    if length > 0.0 {
+        numbers.iter_mut().for_each(|x| *x /= length);
+    }
+    numbers
 }
 
 fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
