@@ -341,7 +341,8 @@ fn agreements(loaded: &Loaded, rows: &Coefficients, judge: &Judge) -> Result<Vec
                     .unzip();
                 adjusted_rand_index(&pairs.0, &pairs.1)
             };
-            let silhouette = found.runs.iter().map(|run| run.silhouette).sum::<f64>() / found.runs.len() as f64;
+            let with_mode: Vec<f64> = found.runs.iter().filter_map(|run| run.silhouette).collect();
+            let silhouette = with_mode.iter().sum::<f64>() / with_mode.len().max(1) as f64;
             let queried = |label: usize| judge.queries.iter().any(|query| query.index == label);
             result.push(ModesAgreement {
                 by,
