@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 
 use super::Answer;
 use crate::options::ModesArgs;
-use crate::output::{Output, some, table, time, two};
+use crate::output::{Output, some, table, two};
 
 #[derive(Args)]
 #[command(
@@ -140,7 +140,7 @@ fn parting_words(found: &Found, unit: &str) -> String {
         match (parting.time, parting.state, parting.evidence.last()) {
             (Some(at), Some(state), _) => {
                 let medoid = found.mode(a).map(|mode| mode.medoid.clone()).unwrap_or_default();
-                format!("\n{a} and {b} part at {} {unit} (state {state} of {medoid})", time(at))
+                format!("\n{a} and {b} part at {at:.3} {unit} (state {state} of {medoid})")
             }
             (_, _, Some(last)) => {
                 format!("\n{a} and {b} never part: {:.0} % of nearest runs are of the own mode at the end", 100.0 * last.apart)

@@ -3,8 +3,9 @@
 //!
 //! 1. core(a): distance to the m-th nearest point, a itself being the first; mutual reachability of a and b:
 //!    max(core(a), core(b), d(a, b)).
-//! 2. Single linkage on it, by the minimum spanning tree.
-//! 3. From the root down, a split is one where both halves have at least m points; else points fall out of the region that
+//! 2. Single linkage on it, by the minimum spanning tree. Mutual reachability has many equal values; what merges at the same
+//!    distance merges at once, so that the order of the points decides nothing (a binary tree would).
+//! 3. From the root down, a split is one where two parts or more have at least m points; else points fall out of the region that
 //!    goes on. Density is λ = 1/distance.
 //! 4. A region's stability is Σ over its points of (λ at which the point leaves − λ at which the region began). From the
 //!    leaves up the better of a region and its parts is kept; the root is no answer.
@@ -40,9 +41,9 @@ pub(super) fn hdbscan(distances: &Distances, smallest: usize) -> Dense {
     label(&regions, &kept, n)
 }
 
-/// A merge of single linkage: two nodes (points below n, then earlier merges) at a distance, and the points below.
+/// A merge of single linkage: nodes (points below n, then earlier merges) at a distance, and the number of points below.
 struct Merge {
-    parts: [usize; 2],
+    parts: Vec<usize>,
     distance: f64,
     size: usize,
 }
@@ -83,7 +84,12 @@ fn single_linkage(distances: &Distances, smallest: usize) -> Vec<Merge> {
     for (distance, a, b) in edges {
         let (a, b) = (root(&mut parent, a), root(&mut parent, b));
         let size = |node: usize| if node < n { 1 } else { merges[node - n].size };
-        let merge = Merge { parts: [node_of[a], node_of[b]], distance, size: size(node_of[a]) + size(node_of[b]) };
+        let parts = |node: usize| match node.checked_sub(n).map(|at| &merges[at]) {
+            Some(merge) if merge.distance == distance => merge.parts.clone(),
+            _ => vec![node],
+        };
+        let (left, right) = (node_of[a], node_of[b]);
+        let merge = Merge { parts: [parts(left), parts(right)].concat(), distance, size: size(left) + size(right) };
         parent[b] = a;
         node_of[a] = n + merges.len();
         merges.push(merge);
@@ -118,23 +124,20 @@ fn condense(tree: &[Merge], n: usize, smallest: usize, density: impl Fn(f64) -> 
     while let Some((node, region)) = open.pop() {
         let merge = &tree[node - n];
         let at = density(merge.distance);
-        let large: Vec<usize> = merge.parts.into_iter().filter(|&part| size(part) >= smallest).collect();
-        for part in merge.parts.into_iter().filter(|part| !large.contains(part)) {
+        let (large, small): (Vec<usize>, Vec<usize>) = merge.parts.iter().partition(|&&part| size(part) >= smallest);
+        for part in small {
             regions[region].leaves.extend(points_below(tree, n, part).into_iter().map(|point| (point, at)));
         }
-        match large[..] {
-            // A part of one point is large only where one point is enough, which it never is.
-            [part] => open.push((part, region)),
-            [a, b] => {
-                regions[region].split = Some((merge.size, at));
-                for part in [a, b] {
-                    regions.push(new(Some(region), at));
-                    let child = regions.len() - 1;
-                    regions[region].children.push(child);
-                    open.push((part, child));
-                }
-            }
-            _ => {}
+        if let [part] = large[..] {
+            open.push((part, region));
+            continue;
+        }
+        regions[region].split = Some((large.iter().map(|&part| size(part)).sum(), at));
+        for part in large {
+            regions.push(new(Some(region), at));
+            let child = regions.len() - 1;
+            regions[region].children.push(child);
+            open.push((part, child));
         }
     }
     regions
@@ -144,7 +147,7 @@ fn points_below(tree: &[Merge], n: usize, node: usize) -> Vec<usize> {
     let mut open = vec![node];
     let mut points = Vec::new();
     while let Some(node) = open.pop() {
-        if node < n { points.push(node) } else { open.extend(tree[node - n].parts) }
+        if node < n { points.push(node) } else { open.extend(&tree[node - n].parts) }
     }
     points
 }
@@ -203,4 +206,60 @@ fn label(regions: &[Region], kept: &[bool], n: usize) -> Dense {
         dense.strength.push(found.map_or(0.0, |(group, density)| density / most[group]));
     }
     dense
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Points;
+    use super::*;
+
+    /// Groups as sorted lists of values, and the values without a group.
+    fn found(values: &[f64], smallest: usize) -> (Vec<Vec<i64>>, Vec<i64>) {
+        let dense = hdbscan(&Points::on_a_line(values).distances(), smallest);
+        let count = dense.groups.iter().flatten().max().map_or(0, |most| most + 1);
+        let of = |group: Option<usize>| {
+            let all = values.iter().zip(&dense.groups).filter(|(_, of)| **of == group).map(|(x, _)| (10.0 * x) as i64);
+            let mut all: Vec<i64> = all.collect();
+            all.sort_unstable();
+            all
+        };
+        let mut groups: Vec<Vec<i64>> = (0..count).map(|group| of(Some(group))).collect();
+        groups.sort();
+        (groups, of(None))
+    }
+
+    #[test]
+    fn groups_of_different_density_and_points_far_from_all() {
+        let values = [0.0, 0.1, 0.2, 0.3, 0.4, 30.0, 31.0, 32.0, 33.0, 34.0, 200.0, -150.0];
+        let (groups, none) = found(&values, 3);
+        assert_eq!(groups, [vec![0, 1, 2, 3, 4], vec![300, 310, 320, 330, 340]]);
+        assert_eq!(none, [-1500, 2000]);
+        assert_eq!(found(&values, 6), (vec![], {
+            let mut all: Vec<i64> = values.iter().map(|x| (10.0 * x) as i64).collect();
+            all.sort_unstable();
+            all
+        }));
+    }
+
+    #[test]
+    fn the_order_of_the_points_changes_nothing_even_where_distances_are_equal() {
+        // Whole numbers have many equal distances.
+        let values: Vec<f64> = (0..40_u32).map(|i| f64::from((i * i * 7) % 83)).collect();
+        for smallest in 2..7 {
+            let first = found(&values, smallest);
+            for step in [3, 7, 11, 39] {
+                let turned: Vec<f64> = (0..40).map(|i| values[i * step % 40]).collect();
+                assert_eq!(found(&turned, smallest), first, "{smallest} {step}");
+            }
+        }
+    }
+
+    #[test]
+    fn strength_is_one_in_the_core_and_falls_outwards() {
+        let dense = hdbscan(&Points::on_a_line(&[0.0, 1.0, 2.0, 3.5, 90.0, 91.0, 92.0]).distances(), 2);
+        assert_eq!(dense.groups[3], dense.groups[0]);
+        assert!(dense.strength[3] < dense.strength[1] && dense.strength[1] == 1.0, "{:?}", dense.strength);
+        let same = hdbscan(&Points::on_a_line(&[4.0; 6]).distances(), 3);
+        assert_eq!((same.groups, same.strength), (vec![Some(0); 6], vec![1.0; 6]));
+    }
 }

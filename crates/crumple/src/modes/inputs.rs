@@ -154,12 +154,13 @@ impl InputEffect {
                 let farthest = shares.iter().max_by(|a, b| (a.1 - a.2).abs().total_cmp(&(b.1 - b.2).abs()));
                 let (name, own, rest) = farthest.cloned().unwrap_or_default();
                 format!(
-                    "{} is {name} in {:.0} % of its runs, in {:.0} % of the others (Cramér's V {:.2}, adjusted p {})",
+                    "{} differs, {} values taken together (Cramér's V {:.2}, adjusted p {}); most: {name}, {:.0} % of its runs, {:.0} % of the others",
                     self.input,
-                    100.0 * own,
-                    100.0 * rest,
+                    shares.len(),
                     self.effect,
-                    p_words(self.p_adjusted)
+                    p_words(self.p_adjusted),
+                    100.0 * own,
+                    100.0 * rest
                 )
             }
         }

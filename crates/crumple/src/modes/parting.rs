@@ -1,7 +1,7 @@
 //! From which state on two modes are apart: when could one have known?
 //!
 //! At each station of time the runs of two modes are looked at as they are grouped, with the coefficients of that moment
-//! alone. They are apart when the nearest other run of almost every run is one of its own mode (leave-one-out nearest
+//! alone. They are apart when the nearest other run of nine in ten is one of the same mode (leave-one-out nearest
 //! neighbour), from that station to the last one. Chance has one half.
 
 use serde::{Deserialize, Serialize};
@@ -12,7 +12,7 @@ use crate::Error;
 use crate::study::Study;
 
 /// Balanced share of nearest neighbours that are of the own mode, from which two modes count as apart.
-pub const APART: f64 = 0.95;
+pub const APART: f64 = 0.9;
 /// Fewer runs than this have no neighbours to speak of.
 const RUNS_MIN: usize = 3;
 /// Members of a mode that are looked at, evenly spaced by run id.
@@ -91,10 +91,15 @@ pub(super) fn partings(
     let parting = |(&(a, b), evidence): (&(usize, usize), Vec<Apart>)| {
         let together = evidence.iter().rposition(|apart| apart.apart < APART);
         let time = evidence.get(together.map_or(0, |at| at + 1)).map(|apart| apart.time);
-        let state = time.and_then(|time| of_run(&modes[a].medoid)?.progress.iter().position(|&at| at >= time));
+        let state = time.and_then(|time| nearest(&of_run(&modes[a].medoid)?.progress, time));
         Parting { modes: [modes[a].name.clone(), modes[b].name.clone()], time, state, evidence }
     };
     Ok(Ok(pairs.iter().zip(evidence).map(parting).collect()))
+}
+
+/// The state whose time is nearest.
+fn nearest(times: &[f64], time: f64) -> Option<usize> {
+    (0..times.len()).min_by(|&a, &b| (times[a] - time).abs().total_cmp(&(times[b] - time).abs()))
 }
 
 /// Share of `own` whose nearest other run is of `own`; a tie is half a run.

@@ -9,6 +9,10 @@ impl Points {
     /// `left_out` of the variance, and at most `most` of them. Points that all coincide get no component at all.
     pub(super) fn principal(&self, left_out: f64, most: usize) -> Self {
         let (count, width) = (self.count(), self.width);
+        let none = || Self { count, width: 0, values: Vec::new() };
+        if count * width == 0 {
+            return none();
+        }
         let mut mean = vec![0.0; width];
         for run in 0..count {
             mean.iter_mut().zip(self.point(run)).for_each(|(mean, x)| *mean += x / count as f64);
@@ -17,7 +21,6 @@ impl Points {
         // The smaller of the two Gram matrices; without a Rayon feature faer works on one thread, so sums have one order.
         let by_runs = count <= width;
         let gram = if by_runs { &centred * centred.transpose() } else { centred.transpose() * &centred };
-        let none = || Self { count, width: 0, values: Vec::new() };
         let Ok(spectrum) = gram.self_adjoint_eigen(Side::Lower) else { return none() };
         let size = gram.nrows();
         let variance = |component: usize| spectrum.S()[size - 1 - component].max(0.0);
