@@ -107,7 +107,9 @@ fn evidence_is_what_it_says() {
     for method in METHODS {
         for count in [2, 3, 5] {
             let modes = found(&loaded, Some(count), method);
-            let group = |run: usize| modes.modes.iter().position(|mode| Some(&mode.name) == modes.runs[run].mode.as_ref()).unwrap();
+            let group = |run: usize| {
+                modes.modes.iter().position(|mode| Some(&mode.name) == modes.runs[run].mode.as_ref()).unwrap()
+            };
             let mean_to = |run: usize, mode: usize| {
                 let others: Vec<usize> = (0..14).filter(|&other| other != run && group(other) == mode).collect();
                 others.iter().map(|&other| distances[run][other]).sum::<f64>() / others.len() as f64
@@ -200,7 +202,10 @@ fn planted_groups_are_found_and_counted() {
                 let found = modes(&loaded.study, &options, &()).unwrap();
                 let groups: Vec<usize> = found.runs.iter().map(group_of).collect();
                 assert_eq!(adjusted_rand_index(&groups, &planted), 1.0, "{by:?} {method:?} {count:?}: {groups:?}");
-                assert_eq!((found.given, found.tried.len()), (count.is_some(), if count.is_some() || !method.takes_count() { 1 } else { 7 }));
+                assert_eq!(
+                    (found.given, found.tried.len()),
+                    (count.is_some(), if count.is_some() || !method.takes_count() { 1 } else { 7 })
+                );
             }
         }
     }

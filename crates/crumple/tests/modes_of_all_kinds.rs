@@ -95,10 +95,15 @@ fn a_state_that_is_there_is_taken_as_it_is_and_one_between_is_between() {
     // At time 5 of 5 states is state 2; the last state of a study that ends there is the same.
     let (_world, whole) = bundle(9, 5);
     let half = World::new();
-    (0..9).for_each(|run| half.write(&id(run), &Model::strip().family_of((0..3).map(|state| {
-        let t = f64::from(state) / 4.0;
-        (10.0 * t, Model::strip().nodes.into_iter().map(|p| kind(run)(t, p)).collect())
-    }))));
+    (0..9).for_each(|run| {
+        half.write(
+            &id(run),
+            &Model::strip().family_of((0..3).map(|state| {
+                let t = f64::from(state) / 4.0;
+                (10.0 * t, Model::strip().nodes.into_iter().map(|p| kind(run)(t, p)).collect())
+            })),
+        )
+    });
     let half = half.study(40);
     for by in [By::Displacement, By::Rotation] {
         let options = |states| ModesOptions { by, states, count: Some(3), ..Default::default() };
@@ -125,11 +130,18 @@ fn a_run_that_writes_other_states_is_the_same_run_along_time_and_one_that_is_slo
     }
     // The path of run 0, written at other times; and run through with another speed.
     let path = |t: f64| -> Vec<Point> { Model::strip().nodes.into_iter().map(|p| kind(0)(t, p)).collect() };
-    world.write("run_90", &Model::strip().family_of((0..=64).map(|at| f64::from(at) / 64.0).map(|t| (10.0 * t, path(t)))));
-    world.write("run_93", &Model::strip().family_of((0..=64).map(|at| f64::from(at) / 64.0).map(|t| (10.0 * t, path(t * t)))));
+    world.write(
+        "run_90",
+        &Model::strip().family_of((0..=64).map(|at| f64::from(at) / 64.0).map(|t| (10.0 * t, path(t)))),
+    );
+    world.write(
+        "run_93",
+        &Model::strip().family_of((0..=64).map(|at| f64::from(at) / 64.0).map(|t| (10.0 * t, path(t * t)))),
+    );
     let loaded = world.study(40);
     let of = |along| {
-        let options = ModesOptions { by: By::Displacement, count: Some(11), method: Method::Ward, ..Default::default() };
+        let options =
+            ModesOptions { by: By::Displacement, count: Some(11), method: Method::Ward, ..Default::default() };
         let series = ask(&loaded.study, ModesOptions { states: States::Series { along }, ..options.clone() });
         let far = ask(&loaded.study, ModesOptions { states: States::Series { along }, count: Some(1), ..options });
         assert_eq!(series.modes.len(), 11);
@@ -156,16 +168,20 @@ fn whole_series_find_the_kinds_and_early_ends_are_said() {
     let mut study = world.empty_study("again", "run_00", 40);
     world.add(&mut study).unwrap();
     for along in [Along::Time, Along::Intrusion] {
-        let found = ask(&study, ModesOptions { states: States::Series { along }, count: Some(3), ..Default::default() });
+        let found =
+            ask(&study, ModesOptions { states: States::Series { along }, count: Some(3), ..Default::default() });
         assert_eq!(found.without_mode(), ["run_99"], "{along:?}");
         assert!(found.notes.iter().any(|note| note.contains("run_99")), "{:?}", found.notes);
         assert_eq!(kinds(&found).len(), 3);
     }
-    let at = ask(&study, ModesOptions {
-        states: States::At { along: Along::Intrusion, stations: vec![0.5, 1.0] },
-        count: Some(3),
-        ..Default::default()
-    });
+    let at = ask(
+        &study,
+        ModesOptions {
+            states: States::At { along: Along::Intrusion, stations: vec![0.5, 1.0] },
+            count: Some(3),
+            ..Default::default()
+        },
+    );
     assert_eq!(kinds(&at).len(), 3);
 }
 
@@ -275,7 +291,9 @@ fn inputs_that_go_with_a_mode_are_told_and_others_are_not() {
             0 => assert!(supplier.tells && supplier.effect > 0.9, "{supplier:?}"),
             _ => {}
         }
-        assert!(matches!(strength.values, Values::Numbers { .. }) && matches!(supplier.values, Values::Categories { .. }));
+        assert!(
+            matches!(strength.values, Values::Numbers { .. }) && matches!(supplier.values, Values::Categories { .. })
+        );
         assert!(mode.inputs.iter().all(|input| input.p <= input.p_adjusted && input.p_adjusted <= 1.0));
         assert!(mode.inputs.windows(2).all(|pair| pair[0].tells >= pair[1].tells));
     }
@@ -316,7 +334,8 @@ fn what_makes_no_sense_is_refused_in_words() {
         Err(Error::Value { name, expected, .. }) => (name, expected),
         other => panic!("{options:?}: {other:?}"),
     };
-    let at = |along, station| ModesOptions { states: States::At { along, stations: vec![station] }, ..Default::default() };
+    let at =
+        |along, station| ModesOptions { states: States::At { along, stations: vec![station] }, ..Default::default() };
     for count in [0, 10] {
         assert_eq!(refused(ModesOptions { count: Some(count), ..Default::default() }).0, "--count");
     }

@@ -143,7 +143,10 @@ fn parting_words(found: &Found, unit: &str) -> String {
                 format!("\n{a} and {b} part at {at:.3} {unit} (state {state} of {medoid})")
             }
             (_, _, Some(last)) => {
-                format!("\n{a} and {b} never part: {:.0} % of nearest runs are of the own mode at the end", 100.0 * last.apart)
+                format!(
+                    "\n{a} and {b} never part: {:.0} % of nearest runs are of the own mode at the end",
+                    100.0 * last.apart
+                )
             }
             _ => format!("\n{a} and {b}: too few runs to say when they part"),
         }

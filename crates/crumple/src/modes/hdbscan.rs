@@ -234,11 +234,14 @@ mod tests {
         let (groups, none) = found(&values, 3);
         assert_eq!(groups, [vec![0, 1, 2, 3, 4], vec![300, 310, 320, 330, 340]]);
         assert_eq!(none, [-1500, 2000]);
-        assert_eq!(found(&values, 6), (vec![], {
-            let mut all: Vec<i64> = values.iter().map(|x| (10.0 * x) as i64).collect();
-            all.sort_unstable();
-            all
-        }));
+        assert_eq!(
+            found(&values, 6),
+            (vec![], {
+                let mut all: Vec<i64> = values.iter().map(|x| (10.0 * x) as i64).collect();
+                all.sort_unstable();
+                all
+            })
+        );
     }
 
     #[test]

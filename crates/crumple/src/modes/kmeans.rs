@@ -14,10 +14,8 @@ const ITERATIONS_MAX: usize = 300;
 /// The group of each point. The result depends on the seed, not on the number of threads: each start has its own
 /// stream of random numbers, and the best is taken by sum of squares, ties by the order of the starts.
 pub(super) fn kmeans(points: &Points, count: usize, seed: u64, starts: u64) -> Vec<usize> {
-    let runs: Vec<(f64, Vec<usize>)> = (0..starts)
-        .into_par_iter()
-        .map(|start| one_start(points, count, seed, start))
-        .collect();
+    let runs: Vec<(f64, Vec<usize>)> =
+        (0..starts).into_par_iter().map(|start| one_start(points, count, seed, start)).collect();
     let best = runs.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
     best.map(|(_, groups)| groups).unwrap_or_default()
 }

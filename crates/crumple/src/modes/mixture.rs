@@ -105,8 +105,7 @@ impl Prior {
         let total: f64 = (0..runs).map(&share).sum();
         let centre = |at: usize| (0..runs).map(|run| share(run) * points.point(run)[at]).sum::<f64>();
         // A Gaussian that has lost all its points is the prior's.
-        let centre: Vec<f64> =
-            (0..d).map(|at| if total > 0.0 { centre(at) / total } else { self.mean[at] }).collect();
+        let centre: Vec<f64> = (0..d).map(|at| if total > 0.0 { centre(at) / total } else { self.mean[at] }).collect();
         let mean = (0..d)
             .map(|at| (total * centre[at] + MEAN_WEIGHT * self.mean[at]) / (total + MEAN_WEIGHT))
             .collect::<Vec<f64>>();
@@ -149,7 +148,8 @@ impl Gaussian {
     /// (x − μ)ᵀ Σ⁻¹ (x − μ).
     fn square_distance(&self, point: &[f64]) -> f64 {
         let off: Vec<f64> = point.iter().zip(&self.mean).map(|(x, mean)| x - mean).collect();
-        let product = |row: usize| (0..off.len()).map(|column| self.precision[(row, column)] * off[column]).sum::<f64>();
+        let product =
+            |row: usize| (0..off.len()).map(|column| self.precision[(row, column)] * off[column]).sum::<f64>();
         (0..off.len()).map(|row| off[row] * product(row)).sum()
     }
 

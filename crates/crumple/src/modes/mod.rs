@@ -249,7 +249,9 @@ fn best(tried: &[Tried], choose: Choose) -> usize {
 fn doubts(tried: &Tried, found: &Modes, runs: usize) -> Vec<String> {
     let mut doubts = Vec::new();
     if found.modes.is_empty() {
-        doubts.push("HDBSCAN sees no two dense groups, so no run has a mode; other methods divide the runs all the same".into());
+        doubts.push(
+            "HDBSCAN sees no two dense groups, so no run has a mode; other methods divide the runs all the same".into(),
+        );
     } else if let Some(stability) = tried.stability.filter(|stability| *stability < STABLE && found.modes.len() > 1) {
         doubts.push(format!(
             "these {} modes are doubtful: other groups are found when a fifth of the runs is left out (stability {stability:.2})",

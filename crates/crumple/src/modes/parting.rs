@@ -62,7 +62,8 @@ pub(super) fn partings(
         return Ok(Err(format!("{states} states are too many to look for the state at which modes part")));
     }
     let histories = Histories::read(study, by, Along::Time, area)?;
-    let of_run = |id: &String| histories.runs.binary_search_by(|run| run.run.cmp(id)).ok().map(|at| &histories.runs[at]);
+    let of_run =
+        |id: &String| histories.runs.binary_search_by(|run| run.run.cmp(id)).ok().map(|at| &histories.runs[at]);
     let mut runs: Vec<&History> = Vec::new();
     let mut mode_of: Vec<usize> = Vec::new();
     for (at, mode) in modes.iter().enumerate() {
@@ -84,7 +85,10 @@ pub(super) fn partings(
             let members = |mode: usize| -> Vec<usize> { (0..runs.len()).filter(|&run| mode_of[run] == mode).collect() };
             let (a, b) = (members(a), members(b));
             if a.len() >= RUNS_MIN && b.len() >= RUNS_MIN {
-                evidence.push(Apart { time, apart: (own_nearest(&distances, &a, &b) + own_nearest(&distances, &b, &a)) / 2.0 });
+                evidence.push(Apart {
+                    time,
+                    apart: (own_nearest(&distances, &a, &b) + own_nearest(&distances, &b, &a)) / 2.0,
+                });
             }
         }
     }
@@ -105,7 +109,11 @@ fn nearest(times: &[f64], time: f64) -> Option<usize> {
 /// Share of `own` whose nearest other run is of `own`; a tie is half a run.
 fn own_nearest(distances: &Distances, own: &[usize], other: &[usize]) -> f64 {
     let nearest = |run: usize, among: &[usize]| {
-        among.iter().filter(|&&near| near != run).map(|&near| distances.between(run, near)).fold(f64::INFINITY, f64::min)
+        among
+            .iter()
+            .filter(|&&near| near != run)
+            .map(|&near| distances.between(run, near))
+            .fold(f64::INFINITY, f64::min)
     };
     let right = |&run: &usize| match nearest(run, own).total_cmp(&nearest(run, other)) {
         std::cmp::Ordering::Less => 1.0,
@@ -121,7 +129,8 @@ mod tests {
 
     #[test]
     fn neighbours_tell_groups_that_are_apart_and_coincidence_is_chance() {
-        let share = |values: &[f64], a: &[usize], b: &[usize]| own_nearest(&Points::on_a_line(values).distances(), a, b);
+        let share =
+            |values: &[f64], a: &[usize], b: &[usize]| own_nearest(&Points::on_a_line(values).distances(), a, b);
         assert_eq!(share(&[0.0, 1.0, 2.0, 9.0, 9.5, 10.5], &[0, 1, 2], &[3, 4, 5]), 1.0);
         assert_eq!(share(&[5.0; 6], &[0, 1, 2], &[3, 4, 5]), 0.5);
         // 0 and 2 have 1 nearest, which is of the other kind.

@@ -47,7 +47,8 @@ impl Points {
 
     /// Every coordinate scaled to a mean square of 1; one that is zero stays zero.
     pub(super) fn of_equal_spread(&self) -> Self {
-        let square = |at: usize| (0..self.count).map(|run| self.point(run)[at].powi(2)).sum::<f64>() / self.count as f64;
+        let square =
+            |at: usize| (0..self.count).map(|run| self.point(run)[at].powi(2)).sum::<f64>() / self.count as f64;
         let squares: Vec<f64> = (0..self.width).map(square).collect();
         let scaled = |(at, &x): (usize, &f64)| {
             let square = squares[at % self.width];

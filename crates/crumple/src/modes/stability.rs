@@ -38,8 +38,7 @@ pub(super) fn stability(
     let samples: Vec<Vec<Vec<Option<usize>>>> = (0..SAMPLES)
         .into_par_iter()
         .map(|sample| {
-            let chosen: Vec<usize> =
-                draw(drawn.len(), size, seed, sample).into_iter().map(|at| drawn[at]).collect();
+            let chosen: Vec<usize> = draw(drawn.len(), size, seed, sample).into_iter().map(|at| drawn[at]).collect();
             let between = distances.some(&chosen);
             let grouper = grouper.resample(&chosen, grouper.reduced().unwrap_or(points), &between);
             let group = |&count: &usize| {

@@ -65,7 +65,9 @@ pub(super) fn sample(study: &Study, by: By, states: &States, area: f64) -> Resul
     };
     let mut notes = vec![match asked {
         Some(_) => format!("states at {what} {}", list(&stations, unit)),
-        None => format!("{} states of each run, up to {what} {}, which all reach", stations.len(), list(&[needed], unit)),
+        None => {
+            format!("{} states of each run, up to {what} {}, which all reach", stations.len(), list(&[needed], unit))
+        }
     }];
     if !left.is_empty() {
         let names: Vec<&str> = left.iter().take(5).map(|run| run.run.as_str()).collect();
