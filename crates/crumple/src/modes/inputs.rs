@@ -18,6 +18,8 @@ const P_MAX: f64 = 0.05;
 const DELTA_MIN: f64 = 0.33;
 /// Least V of one: 0.3 is a medium effect (Cohen 1988).
 const V_MIN: f64 = 0.3;
+/// Modes that are asked about: HDBSCAN may find hundreds among thousands of runs.
+const MODES_MAX: usize = 20;
 /// Fewer values than this on either side tell nothing.
 const VALUES_MIN: usize = 3;
 
@@ -57,8 +59,10 @@ pub enum Values {
     },
 }
 
-/// Fills the inputs of every mode; strongest first.
+/// Fills the inputs of the twenty largest modes; strongest first.
 pub(super) fn inputs(manifest: &Manifest, modes: &mut [Mode], seed: u64) {
+    let count = modes.len().min(MODES_MAX);
+    let modes = &mut modes[..count];
     for mode in modes.iter_mut() {
         mode.inputs = manifest.inputs.iter().filter_map(|input| effect(manifest, mode, input, seed)).collect();
     }

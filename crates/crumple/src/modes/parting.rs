@@ -17,6 +17,8 @@ pub const APART: f64 = 0.9;
 const RUNS_MIN: usize = 3;
 /// Members of a mode that are looked at, evenly spaced by run id.
 const RUNS_MAX: usize = 100;
+/// Modes that are looked at, the largest: HDBSCAN may find hundreds among thousands of runs.
+const MODES_MAX: usize = 20;
 /// Coefficients of all states that are read for it; more than a gigabyte is left.
 const VALUES_MAX: usize = 250_000_000;
 
@@ -42,7 +44,7 @@ pub struct Apart {
     pub apart: f64,
 }
 
-/// All pairs of modes; or words that say why none was looked at.
+/// All pairs of the twenty largest modes; or words that say why none was looked at.
 ///
 /// # Errors
 /// Reading errors.
@@ -52,6 +54,8 @@ pub(super) fn partings(
     area: f64,
     modes: &[Mode],
 ) -> Result<Result<Vec<Parting>, String>, Error> {
+    // The largest come first.
+    let modes = &modes[..modes.len().min(MODES_MAX)];
     let records = &study.manifest().runs;
     let states: usize = records.values().map(|run| run.times.len()).sum();
     if modes.len() < 2 || states == records.len() {
@@ -65,13 +69,12 @@ pub(super) fn partings(
     let of_run =
         |id: &String| histories.runs.binary_search_by(|run| run.run.cmp(id)).ok().map(|at| &histories.runs[at]);
     let mut runs: Vec<&History> = Vec::new();
-    let mut mode_of: Vec<usize> = Vec::new();
-    for (at, mode) in modes.iter().enumerate() {
+    let mut members: Vec<Vec<usize>> = Vec::new();
+    for mode in modes {
         let step = mode.members.len().div_ceil(RUNS_MAX).max(1);
-        for run in mode.members.iter().step_by(step).filter_map(of_run) {
-            runs.push(run);
-            mode_of.push(at);
-        }
+        let first = runs.len();
+        runs.extend(mode.members.iter().step_by(step).filter_map(of_run));
+        members.push((first..runs.len()).collect());
     }
     let common = common_reach(&runs.iter().map(|run| run.reach()).collect::<Vec<_>>());
     let stations: Vec<f64> = of_run(&modes[0].medoid)
@@ -82,13 +85,10 @@ pub(super) fn partings(
     for &time in &stations {
         let distances = Points::of(by, &histories.at(&runs, &[time]), 1, area).distances();
         for (&(a, b), evidence) in pairs.iter().zip(&mut evidence) {
-            let members = |mode: usize| -> Vec<usize> { (0..runs.len()).filter(|&run| mode_of[run] == mode).collect() };
-            let (a, b) = (members(a), members(b));
+            let (a, b) = (&members[a], &members[b]);
             if a.len() >= RUNS_MIN && b.len() >= RUNS_MIN {
-                evidence.push(Apart {
-                    time,
-                    apart: (own_nearest(&distances, &a, &b) + own_nearest(&distances, &b, &a)) / 2.0,
-                });
+                evidence
+                    .push(Apart { time, apart: (own_nearest(&distances, a, b) + own_nearest(&distances, b, a)) / 2.0 });
             }
         }
     }

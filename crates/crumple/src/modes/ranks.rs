@@ -131,7 +131,8 @@ fn chi_square(table: &[[usize; 2]], own: usize, rest: usize) -> f64 {
 /// p of the categories by permutation: the share of random divisions of the same runs whose χ² is as large. With few runs,
 /// or many categories, the χ² distribution does not hold; this does.
 pub(super) fn categories_p(own: &[&str], rest: &[&str], seed: u64) -> f64 {
-    const PERMUTATIONS: usize = 9999;
+    // Ten thousand, fewer of many values: what takes ten million draws shows in a thousand divisions as well.
+    let permutations = (10_000_000 / (own.len() + rest.len()).max(1)).clamp(999, 9999);
     if own.is_empty() || rest.is_empty() {
         return 1.0;
     }
@@ -142,7 +143,7 @@ pub(super) fn categories_p(own: &[&str], rest: &[&str], seed: u64) -> f64 {
     let mut all: Vec<usize> = own.iter().chain(rest).map(|value| names.binary_search(value).unwrap_or(0)).collect();
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut as_large = 0;
-    for _ in 0..PERMUTATIONS {
+    for _ in 0..permutations {
         let mut table = vec![[0, 0]; names.len()];
         for at in 0..all.len() {
             let other = random.random_range(at..all.len());
@@ -152,7 +153,7 @@ pub(super) fn categories_p(own: &[&str], rest: &[&str], seed: u64) -> f64 {
         as_large += usize::from(chi_square(&table, own.len(), rest.len()) >= seen * (1.0 - 1e-12));
     }
     // The division that was seen is one of them (Phipson and Smyth 2010).
-    (as_large + 1) as f64 / (PERMUTATIONS + 1) as f64
+    (as_large + 1) as f64 / (permutations + 1) as f64
 }
 
 /// p values adjusted for their number, so that of those below q a share of at most q is wrong (Benjamini and Hochberg 1995).
