@@ -16,7 +16,7 @@ use crate::output::{Output, some, table, two};
 
 #[derive(Args)]
 #[command(
-    after_help = "The modes are kept in the study (modes.parquet) until the next call. Names that were given stay with the runs they were given to.\n\nExample:\n  crumple modes study --count 3\n  crumple modes study --name mode-1=crush\n  crumple modes study --method hdbscan\n  crumple modes study --states series --align intrusion"
+    after_help = "The modes are kept in the study (modes.parquet) until the next call. Names that were given stay with the runs they were given to.\n\nExample:\n  crumple modes study --count 3\n  crumple modes study --name mode-2=up\n  crumple modes study --method hdbscan\n  crumple modes study --states series --align intrusion"
 )]
 pub(crate) struct Modes {
     /// Folder of the study
