@@ -8,7 +8,7 @@ use crumple::basis::BasisOptions;
 use crumple::descriptor::{self, DescribeOptions, Descriptor, Select, Set};
 use crumple::field::Field;
 use crumple::inputs::Table;
-use crumple::modes::ModesOptions;
+use crumple::modes::{Along, ModesOptions, States};
 use crumple::similarity::SimilarityOptions;
 use crumple::study::{Function, Loaded, Rows};
 
@@ -68,32 +68,90 @@ impl AddArgs {
 /// Grouping into modes.
 #[derive(Args)]
 pub(crate) struct ModesArgs {
-    /// Number of modes, 1 or more [default: the number from 2 to 8 with the best mean silhouette]
+    /// Number of modes, 1 or more [default: the best of 2 to 8, see --choose; hdbscan finds its own]
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     count: Option<usize>,
-    /// Seed of the random starts; the same seed gives the same modes [default: 1]
+    /// What decides between numbers of modes: the mean `silhouette`, or the `stability` of the groups when runs are left out;
+    /// both are shown [default: silhouette]
+    #[arg(long, value_name = "EVIDENCE")]
+    choose: Option<String>,
+    /// Seed of the random starts and samples; the same seed gives the same modes [default: 1]
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     seed: Option<u64>,
-    /// What makes runs alike: `rotation`, the kind and direction of the deformation wherever it happens, or
-    /// `displacement`, where every place ends up, as in the paper [default: rotation]
+    /// What makes runs alike: `rotation`, the kind and direction of the deformation wherever it happens, `displacement`,
+    /// where every place ends up, as in the paper, or `coordinates`, which have the distances of the displacement
+    /// [default: rotation]
     #[arg(long, value_name = "WHAT")]
     by: Option<String>,
-    /// How to group: kmeans, ward or average [default: kmeans]
+    /// How to group: kmeans, ward, average, mixture (of Gaussians), or hdbscan, which leaves runs in no dense group without a
+    /// mode [default: kmeans]
     #[arg(long, value_name = "METHOD")]
     method: Option<String>,
+    /// Fewest runs of a mode, with --method hdbscan [default: a quarter of the runs, 2 to 5]
+    #[arg(long, value_name = "RUNS", allow_negative_numbers = true)]
+    smallest: Option<usize>,
+    /// Which states of each run are grouped: the `last`, or the whole `series`, see --align [default: last]
+    #[arg(long, value_name = "WHICH")]
+    states: Option<String>,
+    /// Group by the states at this time instead of the last, interpolated; may be given several times
+    #[arg(long = "at", value_name = "TIME", allow_negative_numbers = true, conflicts_with_all = ["states", "at_intrusion"])]
+    at: Vec<f64>,
+    /// Group by the states at this share of the RMS displacement that all runs reach; may be given several times
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true, conflicts_with = "states")]
+    at_intrusion: Vec<f64>,
+    /// What whole series are aligned by: `time` or `intrusion`, the RMS displacement [default: time]
+    #[arg(long, value_name = "ALONG")]
+    align: Option<String>,
 }
 
 impl ModesArgs {
+    /// Whether anything was asked for.
+    pub(crate) fn asked(&self) -> bool {
+        let Self { count, choose, seed, by, method, smallest, states, at, at_intrusion, align } = self;
+        count.is_some()
+            || seed.is_some()
+            || smallest.is_some()
+            || [choose, by, method, states, align].iter().any(|option| option.is_some())
+            || !at.is_empty()
+            || !at_intrusion.is_empty()
+    }
+
     pub(crate) fn options(&self) -> Result<ModesOptions, Error> {
         let default = ModesOptions::default();
+        let choose = self.choose.as_deref().map(str::parse).transpose()?;
         let method = self.method.as_deref().map(str::parse).transpose()?;
-        let by = self.by.as_deref().map(str::parse).transpose()?.unwrap_or(default.by);
+        let by = self.by.as_deref().map(str::parse).transpose()?;
         Ok(ModesOptions {
             count: self.count,
+            choose: choose.unwrap_or(default.choose),
             seed: self.seed.unwrap_or(default.seed),
             method: method.unwrap_or(default.method),
-            by,
+            smallest: self.smallest,
+            by: by.unwrap_or(default.by),
+            states: self.states()?,
         })
+    }
+
+    fn states(&self) -> Result<States, Error> {
+        let align: Option<Along> = self.align.as_deref().map(str::parse).transpose()?;
+        if !self.at.is_empty() {
+            return Ok(States::At { along: Along::Time, stations: self.at.clone() });
+        }
+        if !self.at_intrusion.is_empty() {
+            return Ok(States::At { along: Along::Intrusion, stations: self.at_intrusion.clone() });
+        }
+        match (self.states.as_deref(), align) {
+            (None | Some("last"), None) => Ok(States::Last),
+            (Some("series"), align) => Ok(States::Series { along: align.unwrap_or_default() }),
+            (Some("last") | None, Some(_)) => Err(Error::Value {
+                name: "--align",
+                value: self.align.clone().unwrap_or_default(),
+                expected: "--states series beside it; last states are not aligned".into(),
+            }),
+            (Some(other), _) => {
+                Err(Error::Value { name: "--states", value: other.into(), expected: "last or series".into() })
+            }
+        }
     }
 }
 

@@ -8,9 +8,10 @@
 use crate::Error;
 use crate::descriptor::{Calibration, Descriptor};
 use crate::features::Features;
-use crate::similarity::{Comparer, Metric, SimilarityOptions, unit};
+use crate::similarity::{Comparer, Metric, SimilarityOptions};
 use crate::study::{Loaded, Rows};
 use crate::target::Target;
+use crate::vector::unit;
 
 /// The largest number of folds.
 const FOLDS: usize = 10;

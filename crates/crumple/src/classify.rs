@@ -11,9 +11,9 @@ use crate::Error;
 use crate::features::Features;
 use crate::modes::Modes;
 use crate::select::Kind;
-use crate::similarity::unit;
 use crate::study::{Loaded, Rows, Stored};
 use crate::target::Target;
+use crate::vector::unit;
 
 /// Members of a mode that a run is compared with: the nearest ones.
 pub const NEIGHBOURS: usize = 5;

@@ -266,15 +266,6 @@ pub fn cosine(a: &[f64], b: &[f64]) -> f64 {
     (ab / (aa * bb).sqrt()).clamp(-1.0, 1.0)
 }
 
-/// Of length 1; a zero vector stays zero.
-pub(crate) fn unit(mut numbers: Vec<f64>) -> Vec<f64> {
-    let length = norm(&numbers);
-    if length > 0.0 {
-        numbers.iter_mut().for_each(|x| *x /= length);
-    }
-    numbers
-}
-
 fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a - b).collect()
 }

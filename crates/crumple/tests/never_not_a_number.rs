@@ -36,11 +36,13 @@ fn stored_numbers(study: &Study) {
 fn ask_everything(study: Study) {
     let loaded = Loaded::of(study).unwrap();
     let runs: Vec<String> = loaded.study.manifest().runs.keys().cloned().collect();
-    for method in [Method::KMeans, Method::Ward, Method::Average] {
+    for method in Method::ALL {
         for by in [By::Displacement, By::Rotation] {
             let options = ModesOptions { method, by, ..Default::default() };
             let Ok(made) = modes(&loaded.study, &options, &()) else { continue };
-            let numbers = made.runs.iter().flat_map(|run| [run.distance, run.silhouette]);
+            let numbers =
+                made.runs.iter().flat_map(|run| [run.distance, run.silhouette, run.strength, run.score]).flatten();
+            let numbers = numbers.chain(made.tried.iter().flat_map(|tried| [tried.stability, tried.bic]).flatten());
             assert!(numbers.chain(made.modes.iter().map(|mode| mode.spread)).all(f64::is_finite), "{made:?}");
             save(&loaded.study, &made).unwrap();
             assert_eq!(load(&loaded.study).unwrap(), made);

@@ -78,6 +78,7 @@ impl Analyze {
         seconds.lap("report");
         init::advise(&loaded.basis, output);
         early_words(&loaded.study).iter().for_each(|words| output.note(words));
+        modes.notes.iter().for_each(|words| output.note(words));
         let facts = json!({
             "study": self.output,
             "report": path,
@@ -91,7 +92,7 @@ impl Analyze {
             let unit = &loaded.study.settings().length_unit;
             format!(
                 "{}\n\n{}\n\nreport: {}",
-                super::modes::words(&modes, unit),
+                super::modes::words(&modes, loaded.study.settings()),
                 descriptor_words(&descriptors, unit),
                 path.display()
             )

@@ -298,7 +298,7 @@ fn run_data(loaded: &Loaded, modes: &Modes, cloud: usize, similarity: &[Similari
         let member = membership.get(id.as_str());
         RunData {
             id: id.clone(),
-            mode: member.map(|member| member.mode.clone()),
+            mode: member.and_then(|member| member.mode.clone()),
             outlier: member.is_some_and(|member| member.outlier),
             states: record.times.len(),
             times: record
@@ -310,8 +310,8 @@ fn run_data(loaded: &Loaded, modes: &Modes, cloud: usize, similarity: &[Similari
                 .collect(),
             cloud: clouds.remove(id.as_str()).unwrap_or_default(),
             similarity: by_run.get(id.as_str()).cloned().unwrap_or_default(),
-            distance_to_medoid: member.map(|member| member.distance),
-            silhouette: member.map(|member| member.silhouette),
+            distance_to_medoid: member.and_then(|member| member.distance),
+            silhouette: member.and_then(|member| member.silhouette),
             max_displacement: record.last.max,
             rigid_share: record.last.rigid_share,
             captured: record.last.captured,
