@@ -74,9 +74,10 @@ def read(bundle, labels):
     last = table.groupby("run").tail(1)
     bundle.runs = list(last.run)
     bundle.rho, bundle.delta = triples(last, "r"), triples(last, "d")
-    if "rotation_energy" in table:
-        bundle.energy_states = table.rotation_energy.to_numpy(float)
-        bundle.energy = last.rotation_energy.to_numpy(float)
+    if "turn" in table:
+        # The program stores the root mean square of the field.
+        bundle.energy_states = table.turn.to_numpy(float) ** 2 * bundle.area
+        bundle.energy = last.turn.to_numpy(float) ** 2 * bundle.area
     known = pd.read_csv(labels, dtype=str).set_index("run")
     known.index = [run if run.startswith("run_") else f"run_{int(run):03d}" for run in known.index]
     bundle.label = known.label[bundle.runs].to_numpy(str)

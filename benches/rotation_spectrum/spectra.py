@@ -88,18 +88,36 @@ def paper_similarities(bundle):
     return np.array(rows)
 
 
-def face_rotations(bundle, shape):
-    """T x 3 x 3 rotation, T x 3 x 3 stretch, T areas: polar decomposition of each face's deformation gradient."""
-    def frames(points):
-        a, b, c = (points[bundle.triangles[:, k]] for k in range(3))
-        normal = np.cross(b - a, c - a)
-        double = np.linalg.norm(normal, axis=1)
-        return np.stack([b - a, c - a, normal / double[:, None]], 2), double / 2
+def frames(points, triangles):
+    """Orthonormal frames of faces, T x 3 x 3 with the first edge, its normal in the plane, and the face's normal as columns; the
+    two edges in the plane, T x 2 x 2 as columns."""
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    along = unit(b - a)
+    normal = unit(np.cross(b - a, c - a))
+    across = np.cross(normal, along)
+    zero, length = np.zeros(len(a)), np.linalg.norm(b - a, axis=1)
+    edges = np.stack([length, ((c - a) * along).sum(1), zero, ((c - a) * across).sum(1)], 1).reshape(-1, 2, 2)
+    return np.stack([along, across, normal], 2), edges
 
-    (before, area), (after, _) = frames(bundle.vertices), frames(shape)
-    gradient = after @ np.linalg.inv(before)
-    left, size, right = np.linalg.svd(gradient)
-    return left @ right, np.swapaxes(right, 1, 2) * size[:, None] @ right, area
+
+def face_rotations(bundle, shape):
+    """T x 3 x 3 rotation, T x 3 x 3 stretch, T areas: polar decomposition of each face's deformation gradient. It maps
+    plane to plane and normal to normal, so only a 2 x 2 block is left to decompose."""
+    before, edges = frames(bundle.vertices, bundle.triangles)
+    after, moved = frames(shape, bundle.triangles)
+    (a, b), (zero, d) = (edges[:, 0, 0], edges[:, 0, 1]), (0, edges[:, 1, 1])
+    inverse = np.stack([1 / a, -b / (a * d), zero * a, 1 / d], 1).reshape(-1, 2, 2)
+    plane = moved @ inverse
+    angle = np.arctan2(plane[:, 1, 0] - plane[:, 0, 1], plane[:, 0, 0] + plane[:, 1, 1])
+    turn, gradient = np.zeros((2, len(angle), 3, 3))
+    turn[:, 0, 0] = turn[:, 1, 1] = np.cos(angle)
+    turn[:, 1, 0] = np.sin(angle)
+    turn[:, 0, 1] = -turn[:, 1, 0]
+    turn[:, 2, 2] = 1
+    gradient[:, :2, :2], gradient[:, 2, 2] = plane, 1
+    back = np.swapaxes(before, 1, 2)
+    stretch = before @ np.swapaxes(turn, 1, 2) @ gradient @ back
+    return after @ turn @ back, stretch, a * d / 2
 
 
 def to_vertices(bundle, area, values):
@@ -113,9 +131,24 @@ def skew(rotation):
     return 0.5 * np.stack([rotation[:, 2, 1] - rotation[:, 1, 2], rotation[:, 0, 2] - rotation[:, 2, 0], rotation[:, 1, 0] - rotation[:, 0, 1]], 1)
 
 
+def mean_rotation(rotation, area):
+    """The rotation nearest to the mean by area: without it the field does not see a rigid motion, and its mean is zero."""
+    left, _, right = np.linalg.svd(np.einsum("f,fij->ij", area, rotation))
+    return left @ np.diag([1, 1, np.sign(np.linalg.det(left @ right))]) @ right
+
+
+def rotation_field(bundle, shape, keep_mean=False):
+    """N x 3: sin θ × axis of the faces' rotations relative to their mean, by area."""
+    rotation, _, area = face_rotations(bundle, shape)
+    relative = rotation if keep_mean else mean_rotation(rotation, area).T @ rotation
+    return to_vertices(bundle, area, skew(relative))
+
+
 def fields(bundle, shape):
     """Functions on the vertices that could say how far each place has turned, by name."""
     rotation, stretch, area = face_rotations(bundle, shape)
+    with_mean = rotation
+    rotation = mean_rotation(rotation, area).T @ rotation
     sine = skew(rotation)
     # θ from both sine and cosine; the axis of a half turn is lost in the skew part, of few faces.
     angle = np.arctan2(np.linalg.norm(sine, axis=1), (np.trace(rotation, axis1=1, axis2=2) - 1) / 2)
@@ -126,6 +159,7 @@ def fields(bundle, shape):
         "rotation vector θ × axis": axis * angle[:, None],
         "quaternion, 2 sin θ/2 × axis": axis * (2 * np.sin(angle / 2))[:, None],
         "rotation matrix − 1": rotation - np.eye(3),
+        "sin θ × axis, mean rotation kept": skew(with_mean),
         "normals": normal(shape) - normal(bundle.vertices),
         "stretch U − 1": stretch - np.eye(3),
     }
