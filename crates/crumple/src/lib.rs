@@ -10,6 +10,7 @@
 //! | the surface all runs share | [`mod@reference`] | a run, parts | [`reference::Reference`] |
 //! | eigenbasis | [`basis`] | the reference | [`basis::Basis`] |
 //! | how each place has turned | [`rotation`] | a shape | sin θ × axis |
+//! | other quantities on it: plastic strain | [`field`] | a run, a state | a function on the surface |
 //! | coefficients of every state | [`project`] | a run | [`project::Projected`] |
 //! | what is kept on disk | [`study`] | all of it | [`study::Study`] |
 //! | a state that the user names | [`target`] | `run_007@3` | [`target::Target`] |
@@ -18,6 +19,7 @@
 //! | shape from coefficients | [`reconstruct`] | coefficients | a shape, its errors |
 //! | other methods on the same data | [`rivals`] | displacements | PCA |
 //! | the coefficients that matter | [`descriptor`] | one state | [`descriptor::Descriptor`] |
+//! | the numbers that are compared | [`features`] | a descriptor, coefficients | a few numbers |
 //! | how alike | [`similarity`] | a descriptor, coefficients | a ranking |
 //! | judged against labels | [`compare`] | labels | precision, average precision |
 //! | tables and arrays for others | [`export`] | a study | npy, CSV, Parquet, OBJ, STL |
@@ -31,6 +33,8 @@ pub mod compare;
 pub mod descriptor;
 mod error;
 pub mod export;
+pub mod features;
+pub mod field;
 pub mod inputs;
 pub mod modes;
 pub mod project;
@@ -44,6 +48,7 @@ pub mod select;
 pub mod similarity;
 pub mod study;
 pub mod target;
+mod vector;
 
 pub use error::Error;
 pub use mesh_spectrum::Watch;

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use crate::Error;
+use crate::field::{Field, Layer, Quantity};
 
 /// An opened result file. Opening reads headers and geometry; states are read when asked for.
 pub struct Run {
@@ -18,6 +19,15 @@ pub struct Run {
 
 enum Source {
     D3plot(Box<d3plot::Family>),
+}
+
+/// A field as a result file holds it.
+#[derive(Debug, Clone, PartialEq)]
+pub enum FieldValues {
+    /// Of the nodes, nodes × 3; scalars have zeros in the second and third place.
+    Nodes(Vec<[f64; 3]>),
+    /// Of the shells, in the order of [`Run::faces`]. NaN for rigid shells, which have no words.
+    Shells(Vec<f64>),
 }
 
 /// What a result file holds.
@@ -251,5 +261,33 @@ impl Run {
     pub fn positions(&self, state: usize) -> Result<Vec<[f64; 3]>, Error> {
         let Source::D3plot(family) = &self.source;
         family.coordinates(state)?.ok_or_else(|| Error::NoCoordinates { run: self.id.clone() })
+    }
+
+    /// A field in one state.
+    ///
+    /// # Errors
+    /// [`Error::NoField`] if the states do not hold it, [`Error::Read`] if the file cannot be read there.
+    pub fn field(&self, field: Field, state: usize) -> Result<FieldValues, Error> {
+        let Source::D3plot(family) = &self.source;
+        let layers = match field.layer {
+            Layer::Max => d3plot::Layers::Max,
+            Layer::Min => d3plot::Layers::Min,
+            Layer::Mean => d3plot::Layers::Mean,
+            Layer::Inner => d3plot::Layers::Inner,
+            Layer::Outer => d3plot::Layers::Outer,
+        };
+        let values = match field.quantity {
+            Quantity::PlasticStrain => family.shell_plastic_strain(state, layers)?.map(FieldValues::Shells),
+            Quantity::Temperature => family
+                .temperature(state)?
+                .map(|values| FieldValues::Nodes(values.into_iter().map(|x| [x, 0.0, 0.0]).collect())),
+            Quantity::Velocity => family.velocity(state)?.map(FieldValues::Nodes),
+            Quantity::Acceleration => family.acceleration(state)?.map(FieldValues::Nodes),
+        };
+        values.ok_or_else(|| Error::NoField {
+            run: self.id.clone(),
+            field: field.to_string(),
+            available: family.fields().iter().map(|field| field.name).collect::<Vec<_>>().join(", "),
+        })
     }
 }

@@ -39,7 +39,9 @@ impl Init {
             });
         };
         let run = Run::open(&only.id, &only.path)?;
-        let study = Study::create(&self.study, &run, &self.basis.parts, &self.basis.options(), watch)?;
+        let basis = &self.basis;
+        let study =
+            Study::create(&self.study, &run, &basis.parts, &basis.fields()?, &basis.options(), watch)?;
         let loaded = Loaded::of(study)?;
         let facts = facts(&loaded);
         output.print(&facts, || words(&loaded));

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 use crumple::Error;
-use crumple::descriptor;
 use crumple::similarity::{Comparer, Score};
 use crumple::study::Loaded;
 use crumple::target::{Named, resolve};
@@ -23,7 +22,7 @@ use crate::output::{Output, table, time};
 pub(crate) struct Verify {
     /// Folder of the study
     study: PathBuf,
-    /// Name of a descriptor of the study, or the path of its file
+    /// What to compare with: a descriptor of the study by name, the path of its file, a mode, or a run
     descriptor: String,
     /// Runs: ids of the study, or paths of new result files, which are not added; @N for a state
     #[arg(required = true, value_name = "RUN")]
@@ -48,11 +47,11 @@ impl Verify {
         }
         let options = self.similarity.options()?;
         let loaded = Loaded::open(&self.study)?;
-        let descriptor = descriptor::load(&loaded.study, &self.descriptor)?;
+        let descriptor = self.similarity.descriptor(&loaded, &self.descriptor)?;
         let comparer = Comparer::new(&loaded, &descriptor, options)?;
         let judge = |run: &String| {
             let target = resolve(&loaded, &Named::in_study(&loaded.study, run))?;
-            let score = comparer.score(&target.on(comparer.eigenvectors()));
+            let score = comparer.score_target(&target)?;
             let warnings = target.caveats(descriptor.time);
             let pass = score.similarity >= self.threshold;
             Ok(Judged { run: target.run, state: target.state, time: target.time, score, pass, warnings })
@@ -63,7 +62,7 @@ impl Verify {
         }
         let all = results.iter().all(|judged| judged.pass);
         output.print(
-            &json!({ "descriptor": descriptor.name, "threshold": self.threshold, "results": results }),
+            &json!({ "descriptor": descriptor.name, "kind": options.kind.unwrap_or(descriptor.kind), "threshold": self.threshold, "results": results }),
             || {
                 let cells = results.iter().map(|judged| {
                     let verdict = if judged.pass { "pass" } else { "FAIL" };

@@ -23,6 +23,7 @@ pub use file::{load, save};
 pub(crate) use points::{Distances, Points, square_distance};
 
 use crate::Error;
+use crate::rotation::Ruler;
 use crate::study::{Function, Rows, Study};
 
 /// How to group.
@@ -159,7 +160,7 @@ pub fn modes(study: &Study, options: &ModesOptions, watch: &dyn Watch) -> Result
         });
     }
     let points = match by {
-        By::Rotation => Points::by_rotation(&rows),
+        By::Rotation => Points::by_rotation(&rows, &Ruler::of(&study.basis()?)),
         By::Displacement => Points::by_displacement(&rows, study.basis()?.facts.area),
     };
     let distances = points.distances();

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::rotation::spectrum;
+use crate::rotation::Ruler;
 use crate::study::Coefficients;
 
 /// One point a run.
@@ -28,15 +28,11 @@ impl Points {
         Self { width: count, values }
     }
 
-    /// Band energies and lowest triples, each block centred by the mean of the runs and scaled by its root mean square
-    /// deviation, so that kind and direction weigh alike; then of length 1, so that distances follow the angle (cosine)
-    /// and a strong and a weak deformation of one kind stay together.
-    pub(crate) fn by_rotation(rows: &Coefficients) -> Self {
-        let spectra: Vec<(Vec<f64>, Vec<f64>)> = (0..rows.rows()).map(|row| spectrum(&rows.triples(row))).collect();
-        let (kinds, directions): (Vec<Vec<f64>>, Vec<Vec<f64>>) = spectra.into_iter().unzip();
-        let (kinds, directions) = (standardised(kinds), standardised(directions));
-        let values: Vec<Vec<f64>> =
-            kinds.into_iter().zip(directions).map(|(kind, way)| unit([kind, way].concat())).collect();
+    /// Rotation spectra, of length 1, so that distances follow the angle (cosine) and a strong and a weak deformation of
+    /// one kind stay together.
+    pub(crate) fn by_rotation(rows: &Coefficients, ruler: &Ruler) -> Self {
+        let spectrum = |row: usize| unit(ruler.spectrum(&rows.triples(row), rows.rms[row]).numbers());
+        let values: Vec<Vec<f64>> = (0..rows.rows()).map(spectrum).collect();
         Self { width: values.first().map_or(0, Vec::len), values: values.concat() }
     }
 
@@ -69,21 +65,6 @@ impl Points {
         }
         members.iter().map(|&run| square_distance(self.point(run), &mean).sqrt()).collect()
     }
-}
-
-/// Centred, and divided by the root mean square length of the rows; rows that are all equal become zero.
-fn standardised(mut rows: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
-    let count = rows.len() as f64;
-    let length = |rows: &[Vec<f64>]| (rows.iter().flatten().map(|x| x * x).sum::<f64>() / count).sqrt();
-    let before = length(&rows);
-    let mut mean = vec![0.0; rows.first().map_or(0, Vec::len)];
-    rows.iter().for_each(|row| mean.iter_mut().zip(row).for_each(|(mean, x)| *mean += x / count));
-    rows.iter_mut().for_each(|row| row.iter_mut().zip(&mean).for_each(|(x, mean)| *x -= mean));
-    let deviation = length(&rows);
-    // Coefficients are f32: what is left below that, when equal runs are centred, is rounding.
-    let scale = if deviation > 1e-7 * before { 1.0 / deviation } else { 0.0 };
-    rows.iter_mut().flatten().for_each(|x| *x *= scale);
-    rows
 }
 
 /// Of length 1; a zero row stays zero.

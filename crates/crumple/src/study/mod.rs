@@ -48,6 +48,7 @@ use staged::StagedFolder;
 use crate::Error;
 use crate::basis::{Basis, BasisOptions};
 use crate::error::io;
+use crate::field::Field;
 use crate::reference::Reference;
 use crate::run::Run;
 
@@ -73,6 +74,9 @@ pub struct Settings {
     /// Distance of the join; absent when components stay apart.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub join: Option<f64>,
+    /// Quantities of the result files that are projected beside the shape.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fields: Vec<Field>,
     /// The operator.
     pub operator: String,
     /// The mass matrix.
@@ -103,7 +107,8 @@ pub struct Study {
 }
 
 impl Study {
-    /// Makes a study: reference mesh, operator, eigenbasis. The folder appears when everything is in it.
+    /// Makes a study: reference mesh, operator, eigenbasis. `fields` are what will be projected of each run beside its
+    /// shape; the reference run must carry them. The folder appears when everything is in it.
     ///
     /// # Errors
     /// [`Error::StudyExists`] if there is anything at `folder`, and everything that [`Reference::of_run`] and
@@ -112,6 +117,7 @@ impl Study {
         folder: &Path,
         run: &Run,
         parts: &[String],
+        fields: &[Field],
         options: &BasisOptions,
         watch: &dyn Watch,
     ) -> Result<Self, Error> {
@@ -128,6 +134,9 @@ impl Study {
         // Can it be written at all? Better asked before the eigenbasis than after.
         drop(StagedFolder::beside(folder)?);
         let reference = Reference::of_run(run, parts)?;
+        if !run.times().is_empty() {
+            fields.iter().try_for_each(|field| run.field(*field, 0).map(drop))?;
+        }
         let mut basis = Basis::compute(&reference, options, watch)?;
         let staged = StagedFolder::beside(folder)?;
         let settings = Settings {
@@ -136,6 +145,7 @@ impl Study {
             parts: reference.parts.clone(),
             eigenpairs: options.eigenpairs,
             join: options.join,
+            fields: fields.to_vec(),
             operator: "cotangent".into(),
             mass: "lumped".into(),
             length_unit: "mm".into(),
@@ -197,11 +207,17 @@ impl Study {
         &self.manifest
     }
 
-    /// Whether the study is what these wishes would make: the same surface, parts, eigenpairs and join.
+    /// Whether the study is what these wishes would make: the same surface, parts, fields, eigenpairs and join.
     ///
     /// # Errors
     /// Those of [`Reference::of_run`] and [`Study::reference`].
-    pub fn is_for(&self, run: &Run, parts: &[String], options: &BasisOptions) -> Result<bool, Error> {
+    pub fn is_for(
+        &self,
+        run: &Run,
+        parts: &[String],
+        fields: &[Field],
+        options: &BasisOptions,
+    ) -> Result<bool, Error> {
         let reference = Reference::of_run(run, parts)?;
         let same_mesh = || -> Result<bool, Error> {
             let here = self.reference()?;
@@ -211,6 +227,7 @@ impl Study {
         };
         Ok(self.settings.eigenpairs == options.eigenpairs
             && self.settings.join == options.join
+            && self.settings.fields == fields
             && self.settings.parts == reference.parts
             && same_mesh()?)
     }

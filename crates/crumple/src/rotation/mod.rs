@@ -6,11 +6,17 @@
 //! for a translation.
 //!
 //! For each face the deformation gradient F maps two edges and the unit normal of the undeformed face to those of the
-//! deformed one; F = R U with R a rotation by θ about an axis a (polar decomposition). A vertex has the mean of its
-//! faces' rotations, weighted by area, and the field there is r = sin θ a, the skew part of R: unlike the rotation
-//! vector θ a it does not jump at half a turn, which folds do reach. It is projected like any function: ρ = Φᵀ M r.
+//! deformed one; F = R U with R a rotation by θ about an axis a (polar decomposition). The face has r = sin θ a, the
+//! skew part of R: unlike the rotation vector θ a it does not jump at half a turn, which folds do reach. A vertex has the
+//! mean of its faces, weighted by area, so that with the lumped mass ρ = Φᵀ M r = Σ over faces of A_f r_f times the mean
+//! of φ at its corners: the integral of φ r for a field that is constant on faces.
 
-type Vector = [f64; 3];
+mod spectrum;
+
+pub use spectrum::{OCTAVES, RotationSpectrum, Ruler};
+
+use crate::vector::{Vector, cross, dot, subtract};
+
 /// A 3 × 3 matrix by columns.
 type Matrix = [Vector; 3];
 
@@ -18,21 +24,27 @@ type Matrix = [Vector; 3];
 ///
 /// `undeformed`, `shape`: N × 3.
 pub fn field(triangles: &[[u32; 3]], undeformed: &[Vector], shape: &[Vector]) -> Vec<Vector> {
-    // Means are taken of unit quaternions, q and −q being the same rotation.
-    let mut mean = vec![[0.0; 4]; undeformed.len()];
+    let mut sum = vec![Vector::default(); undeformed.len()];
+    let mut areas = vec![0.0; undeformed.len()];
     for triangle in triangles {
         let corners = |points: &[Vector]| triangle.map(|vertex| points[vertex as usize]);
         let (Some((from, area)), Some((to, _))) = (frame(corners(undeformed)), frame(corners(shape))) else { continue };
         let Some(inverse) = inverse(&from) else { continue };
-        let turned = quaternion(&nearest_rotation(multiply(&to, &inverse)));
+        let turned = skew_part(&nearest_rotation(multiply(&to, &inverse)));
+        if !turned.iter().all(|x| x.is_finite()) {
+            continue;
+        }
         for &vertex in triangle {
-            let mean = &mut mean[vertex as usize];
-            let along: f64 = mean.iter().zip(&turned).map(|(a, b)| a * b).sum();
-            let weight = if along < 0.0 { -area } else { area };
-            mean.iter_mut().zip(&turned).for_each(|(mean, x)| *mean += weight * x);
+            areas[vertex as usize] += area;
+            (0..3).for_each(|c| sum[vertex as usize][c] += area * turned[c]);
         }
     }
-    mean.into_iter().map(skew_part).collect()
+    sum.iter().zip(&areas).map(|(sum, &area)| if area > 0.0 { sum.map(|x| x / area) } else { *sum }).collect()
+}
+
+/// sin θ × axis of a rotation.
+fn skew_part([[_, yx, zx], [xy, _, zy], [xz, yz, _]]: &Matrix) -> Vector {
+    [(zy - yz) / 2.0, (xz - zx) / 2.0, (yx - xy) / 2.0]
 }
 
 /// Two edges and the unit normal as columns, and the area; `None` for a triangle without area.
@@ -64,28 +76,6 @@ fn nearest_rotation(mut x: Matrix) -> Matrix {
     x
 }
 
-/// The unit quaternion [w, x, y, z] of a rotation, by its largest component (Shepperd 1978).
-fn quaternion(r: &Matrix) -> [f64; 4] {
-    let [[xx, yx, zx], [xy, yy, zy], [xz, yz, zz]] = *r;
-    // Each row is 4 q_i q; the one with the largest q_i² is the most exact.
-    let rows = [
-        [1.0 + xx + yy + zz, zy - yz, xz - zx, yx - xy],
-        [zy - yz, 1.0 + xx - yy - zz, xy + yx, xz + zx],
-        [xz - zx, xy + yx, 1.0 - xx + yy - zz, yz + zy],
-        [yx - xy, xz + zx, yz + zy, 1.0 - xx - yy + zz],
-    ];
-    let best = (0..4).max_by(|&a, &b| rows[a][a].total_cmp(&rows[b][b])).unwrap_or(0);
-    let length = rows[best].iter().map(|x| x * x).sum::<f64>().sqrt();
-    if length > 0.0 && length.is_finite() { rows[best].map(|x| x / length) } else { [1.0, 0.0, 0.0, 0.0] }
-}
-
-/// sin θ × axis of a quaternion of any length: with w = cos θ/2 and |(x, y, z)| = sin θ/2 it is 2 w (x, y, z); zero
-/// for the zero quaternion.
-fn skew_part([w, x, y, z]: [f64; 4]) -> Vector {
-    let square = w * w + x * x + y * y + z * z;
-    if square > 0.0 { [x, y, z].map(|component| 2.0 * w * component / square) } else { [0.0; 3] }
-}
-
 fn multiply(a: &Matrix, b: &Matrix) -> Matrix {
     b.map(|column| std::array::from_fn(|row| (0..3).map(|k| a[k][row] * column[k]).sum()))
 }
@@ -96,45 +86,6 @@ fn inverse(m: &Matrix) -> Option<Matrix> {
     let determinant = dot(m[0], rows[0]);
     (determinant != 0.0 && determinant.is_finite())
         .then(|| std::array::from_fn(|column| std::array::from_fn(|row| rows[row][column] / determinant)))
-}
-
-fn subtract(a: Vector, b: Vector) -> Vector {
-    std::array::from_fn(|c| a[c] - b[c])
-}
-
-fn cross(a: Vector, b: Vector) -> Vector {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn dot(a: Vector, b: Vector) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-/// Kind and direction of a deformation in a few numbers: √Σ ρ² in bands of index, then the first triples with sign.
-///
-/// `rho`: K × 3 of one state. Bands have geometric edges from 1 to K, rounded; [`BANDS`] of them at K = 500, fewer
-/// where rounded edges coincide. The two blocks are returned apart, since they are scaled apart.
-pub fn spectrum(rho: &[Vector]) -> (Vec<f64>, Vec<f64>) {
-    let energy = |band: &[Vector]| band.iter().flatten().map(|x| x * x).sum::<f64>().sqrt();
-    let edges = band_edges(rho.len());
-    let bands = edges.windows(2).map(|edge| energy(&rho[edge[0] - 1..edge[1] - 1])).collect();
-    (bands, rho.iter().take(TRIPLES).flatten().copied().collect())
-}
-
-/// Bands at K = 500.
-pub const BANDS: usize = 13;
-/// Triples whose direction counts.
-pub const TRIPLES: usize = 4;
-
-/// First eigenvector (counted from 1) of each band, and one past the last.
-fn band_edges(eigenpairs: usize) -> Vec<usize> {
-    let edge = |at: usize| (eigenpairs as f64).powf(at as f64 / BANDS as f64).round() as usize;
-    let mut edges: Vec<usize> = (0..=BANDS).map(edge).collect();
-    edges.dedup();
-    if let Some(last) = edges.last_mut() {
-        *last = eigenpairs + 1;
-    }
-    edges
 }
 
 #[cfg(test)]
@@ -174,15 +125,5 @@ mod tests {
         let good = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
         assert_eq!(field(&TRIANGLE, &flat, &good), [[0.0; 3]; 3]);
         assert_eq!(field(&TRIANGLE, &good, &flat), [[0.0; 3]; 3]);
-    }
-
-    #[test]
-    fn bands_cover_every_eigenvector_once() {
-        assert_eq!(band_edges(500), [1, 2, 3, 4, 7, 11, 18, 28, 46, 74, 119, 192, 310, 501]);
-        for eigenpairs in 1..=60 {
-            let edges = band_edges(eigenpairs);
-            assert!(edges[0] == 1 && *edges.last().unwrap() == eigenpairs + 1 || eigenpairs == 1, "{edges:?}");
-            assert!(edges.windows(2).all(|edge| edge[0] < edge[1]));
-        }
     }
 }
