@@ -17,6 +17,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("mesh-spectrum", &[]),
     ("crumple", &["d3plot", "mesh-spectrum"]),
     ("crumple-cli", &["crumple"]),
+    ("structures", &[]),
 ];
 
 /// The stages of crates/crumple/src in the order of the flow: each may use those before it.
