@@ -101,7 +101,7 @@ impl Basis {
             .map(|distance| mesh_spectrum::join(&reference.mesh, distance))
             .transpose()?
             .map_or(0, |join| join.pairs);
-        let operator = mesh_spectrum::operator(&reference.mesh, &OperatorOptions { join }).map_err(Error::Operator)?;
+        let operator = mesh_spectrum::operator(&reference.mesh, &OperatorOptions { join, ..Default::default() }).map_err(Error::Operator)?;
         let solved =
             mesh_spectrum::eigenbasis(&operator, &EigenOptions { count: eigenpairs, ..Default::default() }, watch)?;
         let eigenvectors: Vec<f32> = solved.eigenvectors.iter().map(|&x| x as f32).collect();
