@@ -34,7 +34,7 @@ pub struct Placement {
 }
 
 /// A face by the user ids of its nodes, in rising order: the same face in any run, whatever the order of its corners.
-type FaceKey = [u64; 4];
+pub(crate) type FaceKey = [u64; 4];
 
 impl Reference {
     /// Takes the shells of the named parts (ids or titles; all shells when none is named) of a run.
@@ -131,6 +131,20 @@ impl Reference {
         Ok(shape)
     }
 
+    /// The triangles of each face, by its node ids.
+    pub(crate) fn triangles_of_face(&self) -> HashMap<FaceKey, Vec<u32>> {
+        let mut triangles: HashMap<FaceKey, Vec<u32>> = HashMap::new();
+        let mut next = 0;
+        for key in self.face_keys() {
+            let face = self.shell_of_triangle[next];
+            let own = (next..self.shell_of_triangle.len()).take_while(|&at| self.shell_of_triangle[at] == face);
+            let own: Vec<u32> = own.take(2).map(|at| at as u32).collect();
+            next += own.len();
+            triangles.entry(key).or_default().extend(own);
+        }
+        triangles
+    }
+
     /// The input faces, each by its node ids; a quad is put together again from its two triangles.
     fn face_keys(&self) -> Vec<FaceKey> {
         let ids_of = |triangle: &[u32; 3]| triangle.map(|vertex| self.node_ids[vertex as usize]);
@@ -203,7 +217,7 @@ fn used_nodes(nodes: usize, faces: &[[u32; 4]]) -> (Vec<u32>, Vec<u32>) {
 }
 
 /// Distinct ids in rising order, the last one repeated where there are fewer than four.
-fn face_key(ids: [u64; 4]) -> FaceKey {
+pub(crate) fn face_key(ids: [u64; 4]) -> FaceKey {
     let mut key = ids;
     key.sort_unstable();
     let mut distinct: Vec<u64> = key.to_vec();

@@ -50,14 +50,17 @@ pub enum JoinError {
 /// A distance that is not a positive length, or more than ten times the longest edge (vertices that far apart do not
 /// name the same place, and the search would take the square of their number).
 pub fn join(mesh: &Mesh, distance: f64) -> Result<Join, JoinError> {
-    let ties = pairs_of(mesh, distance)?;
+    let ties = ties_of(mesh, distance)?;
     // Vertices of the mesh with one weight each: never refused.
     let reduction = Reduction::new(mesh.vertices().len(), &ties).unwrap_or_else(|error| unreachable!("{error}"));
     Ok(Join { dof_of_vertex: reduction.dof_of_vertex, dofs: reduction.dofs, pairs: ties.len() })
 }
 
-/// The pairs as ties: the higher vertex of each has the value of the lower one.
-pub(crate) fn pairs_of(mesh: &Mesh, distance: f64) -> Result<Vec<Tie>, JoinError> {
+/// The pairs of [`join`] as ties: the higher vertex of each has the value of the lower one.
+///
+/// # Errors
+/// As [`join`].
+pub fn ties_of(mesh: &Mesh, distance: f64) -> Result<Vec<Tie>, JoinError> {
     if !(distance > 0.0 && distance.is_finite()) {
         return Err(JoinError::Distance { distance });
     }

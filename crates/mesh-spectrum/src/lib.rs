@@ -40,6 +40,6 @@ mod proximity;
 pub use coupling::{CouplingError, Tie};
 pub use eigen::{Certificate, EigenError, EigenOptions, Eigenbasis, InertiaCount, Method, Watch, eigenbasis};
 pub use inspect::{Inspection, inspect};
-pub use join::{Join, JoinError, join};
+pub use join::{Join, JoinError, join, ties_of};
 pub use mesh::{Mesh, MeshError};
 pub use operator::{Csr, Operator, OperatorError, OperatorOptions, operator};

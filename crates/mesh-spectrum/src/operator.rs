@@ -15,7 +15,7 @@
 use thiserror::Error;
 
 use crate::coupling::{CouplingError, Reduction, Tie};
-use crate::join::{JoinError, pairs_of};
+use crate::join::{JoinError, ties_of};
 use crate::mesh::{Mesh, Point, Union, dot, double_area, sub};
 
 /// How the operator is built from the mesh.
@@ -98,7 +98,7 @@ pub enum OperatorError {
 pub fn operator(mesh: &Mesh, options: &OperatorOptions) -> Result<Operator, OperatorError> {
     let OperatorOptions { join: distance, ties } = options;
     let vertices = mesh.vertices().len();
-    let near = distance.map_or(Ok(Vec::new()), |distance| pairs_of(mesh, distance))?;
+    let near = distance.map_or(Ok(Vec::new()), |distance| ties_of(mesh, distance))?;
     let all: Vec<Tie> = near.iter().chain(ties).cloned().collect();
     let reduction = Reduction::new(vertices, &all)?;
     let dofs = reduction.dofs;
