@@ -43,11 +43,8 @@ fn drop_second_nodes(deck: &mut Deck) {
 }
 
 fn missing_nodes(deck: &mut Deck) {
-    let mut ids = deck.node_ids.clone();
-    if !ids.is_sorted() {
-        ids.sort_unstable();
-    }
-    let missing = |node: &u64| *node != 0 && ids.binary_search(node).is_err();
+    let defined = Ids::of(&deck.node_ids);
+    let missing = |node: &u64| *node != 0 && !defined.has(*node);
     let shells = deck.shells.iter().map(|shell| (shell.id, &shell.nodes[..]));
     let solids = deck.solids.iter().chain(&deck.thick_shells).map(|solid| (solid.id, &solid.nodes[..]));
     let beams = deck.beams.iter().map(|beam| (beam.id, &beam.nodes[..]));
@@ -61,5 +58,35 @@ fn missing_nodes(deck: &mut Deck) {
     }
     if let Some((element, node)) = example {
         deck.warnings.push(Warning::NodesMissing { elements, element, node });
+    }
+}
+
+/// Which ids there are: a bit each where they lie close, a sorted list where they do not.
+enum Ids {
+    Bits { first: u64, bits: Vec<u64> },
+    Sorted(Vec<u64>),
+}
+
+impl Ids {
+    fn of(ids: &[u64]) -> Ids {
+        let (Some(&first), Some(&last)) = (ids.iter().min(), ids.iter().max()) else { return Ids::Sorted(Vec::new()) };
+        // As a bit each they take no more memory than as words.
+        if (last - first) / 64 <= ids.len() as u64 {
+            let mut bits = vec![0; ((last - first) / 64 + 1) as usize];
+            ids.iter().for_each(|id| bits[((id - first) / 64) as usize] |= 1 << ((id - first) % 64));
+            return Ids::Bits { first, bits };
+        }
+        let mut sorted = ids.to_vec();
+        sorted.sort_unstable();
+        Ids::Sorted(sorted)
+    }
+
+    fn has(&self, id: u64) -> bool {
+        match self {
+            Ids::Bits { first, bits } => id.checked_sub(*first).is_some_and(|at| {
+                bits.get((at / 64) as usize).is_some_and(|word| word >> (at % 64) & 1 == 1)
+            }),
+            Ids::Sorted(sorted) => sorted.binary_search(&id).is_ok(),
+        }
     }
 }

@@ -9,7 +9,7 @@ use crate::set::Set;
 use crate::warning::Warning;
 
 /// A keyword deck with all its includes.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Deck {
     /// *TITLE, of the first file that has one.
     pub title: String,
