@@ -1,14 +1,18 @@
 //! Options that several commands share, and what they mean to the library. Defaults live there, not here.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use clap::Args;
 use crumple::Error;
 use crumple::basis::BasisOptions;
+use crumple::deck;
 use crumple::descriptor::{self, DescribeOptions, Descriptor, Select, Set};
 use crumple::field::Field;
 use crumple::inputs::Table;
+use crumple::joints::Join;
 use crumple::modes::{Along, ModesOptions, States};
+use crumple::run::Run;
 use crumple::similarity::SimilarityOptions;
 use crumple::study::{Function, Loaded, Rows};
 
@@ -22,10 +26,15 @@ pub(crate) struct BasisArgs {
     /// plastic_strain:outer (max, min, mean, inner, outer) for one layer of shells; may be given several times
     #[arg(long = "field", value_name = "FIELD")]
     fields: Vec<String>,
-    /// Treat separate sheets as one: mutually nearest vertices of different pieces of the mesh that are closer than this
-    /// (length unit of the model) share one degree of freedom. `init` recommends a distance where sheets lie close
-    #[arg(long, value_name = "DISTANCE", allow_negative_numbers = true)]
-    join: Option<f64>,
+    /// Treat separate sheets as one. A distance: mutually nearest vertices of different pieces of the mesh that are closer
+    /// (length unit of the model) share one degree of freedom; `init` recommends one where sheets lie close. `deck`: what
+    /// the deck's spot welds, rigid bodies and tied contacts hold moves together
+    #[arg(long, value_name = "DISTANCE|deck", allow_negative_numbers = true)]
+    join: Option<String>,
+    /// Keyword deck (.k, .key, .dyn) of the model: titles of parts, and the welds and ties that `--join deck` needs
+    /// [default: the reference itself where it is a deck; for a study the deck it was made with]
+    #[arg(long, value_name = "FILE")]
+    deck: Option<PathBuf>,
     /// Eigenpairs K of the basis, 1 or more; each costs time and space, and resolves finer folds [default: 500]
     #[arg(short = 'K', long, value_name = "K", allow_negative_numbers = true)]
     eigenpairs: Option<usize>,
@@ -39,9 +48,26 @@ impl BasisArgs {
         Ok(fields)
     }
 
-    pub(crate) fn options(&self) -> BasisOptions {
+    pub(crate) fn options(&self) -> Result<BasisOptions, Error> {
         let default = BasisOptions::default();
-        BasisOptions { eigenpairs: self.eigenpairs.unwrap_or(default.eigenpairs), join: self.join }
+        let join = match self.join.as_deref() {
+            None => None,
+            Some("deck") => Some(Join::DECK),
+            Some(text) => Some(Join::Distance(text.parse().map_err(|_| Error::Value {
+                name: "--join",
+                value: text.to_owned(),
+                expected: "a distance in the model's length unit, or the word deck".into(),
+            })?)),
+        };
+        Ok(BasisOptions { eigenpairs: self.eigenpairs.unwrap_or(default.eigenpairs), join })
+    }
+
+    /// The reference run with its deck: the one given, or `known` (a study's own).
+    pub(crate) fn with_deck(&self, run: Run, known: Option<&Path>) -> Result<Run, Error> {
+        match self.deck.as_deref().or(known.filter(|_| run.deck().is_none())) {
+            Some(path) => Ok(run.with_deck(Arc::new(deck::read(path)?))),
+            None => Ok(run),
+        }
     }
 }
 

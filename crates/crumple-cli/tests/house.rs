@@ -14,8 +14,9 @@ use world::{Own, folder, repository};
 /// Who may know whom, and nobody else.
 const MAY_USE: &[(&str, &[&str])] = &[
     ("d3plot", &[]),
+    ("keyword-deck", &[]),
     ("mesh-spectrum", &[]),
-    ("crumple", &["d3plot", "mesh-spectrum"]),
+    ("crumple", &["d3plot", "keyword-deck", "mesh-spectrum"]),
     ("crumple-cli", &["crumple"]),
     ("structures", &[]),
 ];
@@ -25,10 +26,12 @@ const STAGES: &[&str] = &[
     "error",
     "vector",
     "field",
+    "deck",
     "run",
     "bundle",
     "inputs",
     "reference",
+    "joints",
     "basis",
     "select",
     "rotation",
@@ -133,7 +136,7 @@ fn every_file_says_what_it_is_for() {
 
 #[test]
 fn libraries_print_nothing_and_end_nothing() {
-    for library in ["d3plot", "mesh-spectrum", "crumple"] {
+    for library in ["d3plot", "keyword-deck", "mesh-spectrum", "crumple"] {
         for path in rust_files(&repository().join("crates").join(library).join("src")) {
             let code = code(&path);
             for word in ["println!", "eprintln!", "print!(", "dbg!", "todo!", "unimplemented!", "process::exit"] {

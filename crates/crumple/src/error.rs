@@ -12,6 +12,23 @@ pub enum Error {
     /// A result file could not be read.
     #[error("{0}")]
     Read(#[from] d3plot::Error),
+    /// A keyword deck could not be read.
+    #[error("{0}")]
+    Deck(#[from] keyword_deck::Error),
+    /// Joining by a deck was asked for, and there is none.
+    #[error("--join deck: {run} is no keyword deck, and none was given")]
+    NoDeck {
+        /// The reference run.
+        run: String,
+    },
+    /// A deck of another model than the surface.
+    #[error("{}: the deck does not belong to this surface: {what}", deck.display())]
+    OtherDeck {
+        /// The deck.
+        deck: PathBuf,
+        /// What differs.
+        what: String,
+    },
     /// A file whose name says that it is a run and whose content does not.
     #[error("{what}")]
     Refused {
@@ -348,6 +365,9 @@ impl Error {
     pub fn remedy(&self) -> Option<String> {
         let text = match self {
             Self::Read(error) => return error.remedy(),
+            Self::Deck(error) => return error.remedy().map(str::to_owned),
+            Self::NoDeck { .. } => "give the deck with --deck FILE, or join by --join DISTANCE",
+            Self::OtherDeck { .. } => "give the deck that the runs were made from; ids of nodes must be the same",
             Self::Refused { remedy, .. } => return remedy.clone(),
             Self::NoSuchPath(_) => "check the spelling; a run is the root file of a family or its folder",
             Self::NoRuns { .. } => "give the folder that holds the runs, or a run's root file (d3plot)",

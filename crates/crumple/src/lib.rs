@@ -5,9 +5,11 @@
 //!
 //! | stage | module | from | to |
 //! | --- | --- | --- | --- |
+//! | keyword decks | [`deck`] | a path | mesh, titles, welds |
 //! | open result files, find and name them | [`run`], [`bundle`] | paths | [`run::Run`] |
 //! | input tables | [`inputs`] | CSV | a row a run |
 //! | the surface all runs share | [`mod@reference`] | a run, parts | [`reference::Reference`] |
+//! | what welds and ties hold of it | [`joints`] | a deck | [`joints::Joints`] |
 //! | eigenbasis | [`basis`] | the reference | [`basis::Basis`] |
 //! | how each place has turned | [`rotation`] | a shape | sin θ × axis |
 //! | other quantities on it: plastic strain | [`field`] | a run, a state | a function on the surface |
@@ -34,12 +36,14 @@ pub mod bundle;
 pub mod calibrate;
 pub mod classify;
 pub mod compare;
+pub mod deck;
 pub mod descriptor;
 mod error;
 pub mod export;
 pub mod features;
 pub mod field;
 pub mod inputs;
+pub mod joints;
 pub mod modes;
 pub mod project;
 pub mod reconstruct;

@@ -40,7 +40,7 @@ fn what_is_read_is_what_was_written() {
     let study = world.empty_study("study", "run_1", 17);
     let reference = crumple::reference::Reference::of_run(&world.open("run_1"), &[]).unwrap();
     let options = crumple::basis::BasisOptions { eigenpairs: 17, join: None };
-    let basis = crumple::basis::Basis::compute(&reference, &options, &()).unwrap();
+    let basis = crumple::basis::Basis::compute(&reference, &[], &options, &()).unwrap();
     let (read_reference, read_basis) = (study.reference().unwrap(), study.basis().unwrap());
     assert_eq!(read_reference.mesh.vertices(), reference.mesh.vertices());
     assert_eq!(read_reference.mesh.triangles(), reference.mesh.triangles());

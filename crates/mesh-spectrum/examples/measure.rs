@@ -32,7 +32,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         seen.components, seen.gap, seen.edge_length_mean, seen.edge_length_max
     );
     let start = Instant::now();
-    let operator = operator(&mesh, &OperatorOptions { join })?;
+    let operator = operator(&mesh, &OperatorOptions { join, ..Default::default() })?;
     println!("operator {:.4} s, {} dofs", start.elapsed().as_secs_f64(), operator.mass.len());
     let mut times = Vec::new();
     let mut last = None;

@@ -29,6 +29,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod coupling;
 mod eigen;
 mod inspect;
 mod join;
@@ -36,8 +37,9 @@ mod mesh;
 mod operator;
 mod proximity;
 
+pub use coupling::{CouplingError, Tie};
 pub use eigen::{Certificate, EigenError, EigenOptions, Eigenbasis, InertiaCount, Method, Watch, eigenbasis};
 pub use inspect::{Inspection, inspect};
-pub use join::{Join, JoinError, join};
+pub use join::{Join, JoinError, join, ties_of};
 pub use mesh::{Mesh, MeshError};
 pub use operator::{Csr, Operator, OperatorError, OperatorOptions, operator};

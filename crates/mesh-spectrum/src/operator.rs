@@ -4,16 +4,18 @@
 //! |-------|---------------|---------------------------------------|------|
 //! | L     | `stiffness`   | D × D sparse, symmetric, ≥ 0, L·1 = 0 | 1    |
 //! | M     | `mass`        | D, diagonal, > 0                      | ℓ²   |
-//! |       | `vertex_mass` | N, diagonal, > 0                      | ℓ²   |
+//! |       | `vertex_mass` | N, diagonal, ≥ 0                      | ℓ²   |
 //!
-//! D degrees of freedom for N vertices: D = N, unless vertices of different components are joined.
+//! D degrees of freedom for N vertices: D = N, unless vertices are joined or tied to others ([`Tie`]), whose value they
+//! then have; `vertex_mass` is 0 where a vertex follows several.
 //! Weak form: L φ = λ M φ, so λ is in 1/ℓ². Sign: positive (libigl's `cotmatrix` is the negative of ours).
 //! Source: Pinkall and Polthier 1993. An edge with three faces or more gets the sum over all of them. We part from the
 //! source once: a triangle without area is left out and counted.
 
 use thiserror::Error;
 
-use crate::join::{Join, JoinError, join};
+use crate::coupling::{CouplingError, Reduction, Tie};
+use crate::join::{JoinError, ties_of};
 use crate::mesh::{Mesh, Point, Union, dot, double_area, sub};
 
 /// How the operator is built from the mesh.
@@ -22,6 +24,8 @@ pub struct OperatorOptions {
     /// Join mutually nearest vertices of different components at most this far apart, in the model's length unit
     /// ([`join`](crate::join)). Default `None`: components stay apart, and each adds a zero eigenvalue.
     pub join: Option<f64>,
+    /// Vertices that follow others, taken in their order. Default: none.
+    pub ties: Vec<Tie>,
 }
 
 /// Stiffness and lumped mass of a mesh.
@@ -31,10 +35,17 @@ pub struct Operator {
     pub stiffness: Csr,
     /// M's diagonal, D, ℓ²: a third of the area of each face at a degree of freedom.
     pub mass: Vec<f64>,
-    /// N, ℓ²: the same per vertex, for M-products on vertices. Sums to the mesh's area, as `mass` does.
+    /// N, ℓ²: the same per vertex, for M-products on vertices. Sums to the mesh's area, as `mass` does. A vertex that
+    /// follows several has 0 and they have its area.
     pub vertex_mass: Vec<f64>,
-    /// N: the degree of freedom of each vertex.
+    /// N: the degree of freedom of each vertex; the one with the largest weight for a vertex that follows several.
     pub dof_of_vertex: Vec<u32>,
+    /// D: the lowest vertex of each degree of freedom.
+    pub vertex_of_dof: Vec<u32>,
+    /// Vertices that follow several, in rising order, with their weights on degrees of freedom.
+    pub followers: Vec<(u32, Vec<(u32, f64)>)>,
+    /// Ties that hold nothing more, because other ties hold their vertex already.
+    pub idle_ties: usize,
     /// How many pairs of vertices were joined.
     pub pairs_joined: usize,
     /// Connected components after joining, through triangles with area: the dimension of L's null space.
@@ -75,6 +86,9 @@ pub enum OperatorError {
     /// The join distance is not usable.
     #[error(transparent)]
     Join(#[from] JoinError),
+    /// The ties are not usable.
+    #[error(transparent)]
+    Coupling(#[from] CouplingError),
 }
 
 /// Builds L and M. Time and memory O(T).
@@ -82,16 +96,15 @@ pub enum OperatorError {
 /// # Errors
 /// A vertex without a triangle that has area; a join distance that is not usable; areas that overflow.
 pub fn operator(mesh: &Mesh, options: &OperatorOptions) -> Result<Operator, OperatorError> {
-    let &OperatorOptions { join: distance } = options;
+    let OperatorOptions { join: distance, ties } = options;
     let vertices = mesh.vertices().len();
-    let Join { dof_of_vertex, dofs, pairs } = match distance {
-        Some(distance) => join(mesh, distance)?,
-        None => Join { dof_of_vertex: (0..vertices as u32).collect(), dofs: vertices, pairs: 0 },
-    };
+    let near = distance.map_or(Ok(Vec::new()), |distance| ties_of(mesh, distance))?;
+    let all: Vec<Tie> = near.iter().chain(ties).cloned().collect();
+    let reduction = Reduction::new(vertices, &all)?;
+    let dofs = reduction.dofs;
 
     let mut vertex_mass = vec![0.0; vertices];
-    let mut entries: Vec<(u32, u32, f64)> = Vec::with_capacity(12 * mesh.triangles().len());
-    let mut connected = Union::new(dofs);
+    let mut edges: Vec<(u32, u32, f64)> = Vec::with_capacity(3 * mesh.triangles().len());
     let mut triangles_without_area = 0;
     for (number, &triangle) in mesh.triangles().iter().enumerate() {
         let corners = mesh.corners(triangle);
@@ -103,31 +116,37 @@ pub fn operator(mesh: &Mesh, options: &OperatorOptions) -> Result<Operator, Oper
         if !double_area.is_finite() || !cot.iter().all(|cot| cot.is_finite()) {
             return Err(OperatorError::NotFinite { triangle: number });
         }
-        let dof = triangle.map(|vertex| dof_of_vertex[vertex as usize]);
         for k in 0..3 {
             // The edge opposite to corner k.
-            let (i, j) = (dof[(k + 1) % 3], dof[(k + 2) % 3]);
-            let weight = 0.5 * cot[k];
-            entries.extend([(i, j, -weight), (j, i, -weight), (i, i, weight), (j, j, weight)]);
+            edges.push((triangle[(k + 1) % 3], triangle[(k + 2) % 3], 0.5 * cot[k]));
             vertex_mass[triangle[k] as usize] += double_area / 6.0;
-            connected.merge(i, j);
         }
     }
     if let Some(vertex) = vertex_mass.iter().position(|&mass| mass <= 0.0) {
         return Err(OperatorError::NoMass { vertex });
     }
 
+    let vertex_mass = reduction.vertex_mass(vertex_mass);
     let mut mass = vec![0.0; dofs];
-    for (vertex, &dof) in dof_of_vertex.iter().enumerate() {
-        mass[dof as usize] += vertex_mass[vertex];
+    for (&dof, vertex_mass) in reduction.dof_of_vertex.iter().zip(&vertex_mass) {
+        mass[dof as usize] += vertex_mass;
+    }
+    let mut connected = Union::new(dofs);
+    let mut entries: Vec<(u32, u32, f64)> = Vec::with_capacity(4 * edges.len());
+    for (i, j, weight) in reduction.edges(edges) {
+        entries.extend([(i, j, -weight), (j, i, -weight), (i, i, weight), (j, j, weight)]);
+        connected.merge(i, j);
     }
     let (component_of_dof, components) = connected.classes();
     Ok(Operator {
         stiffness: Csr::from_entries(dofs, entries),
         mass,
         vertex_mass,
-        dof_of_vertex,
-        pairs_joined: pairs,
+        vertex_of_dof: reduction.vertex_of_dof(),
+        dof_of_vertex: reduction.dof_of_vertex,
+        followers: reduction.followers,
+        idle_ties: reduction.idle,
+        pairs_joined: near.len(),
         components,
         component_of_dof,
         triangles_without_area,
@@ -139,6 +158,29 @@ pub fn operator(mesh: &Mesh, options: &OperatorOptions) -> Result<Operator, Oper
 pub(crate) fn cotangents([a, b, c]: [Point; 3], double_area: f64) -> [f64; 3] {
     let cot = |u, v| dot(u, v) / double_area;
     [cot(sub(b, a), sub(c, a)), cot(sub(c, b), sub(a, b)), cot(sub(a, c), sub(b, c))]
+}
+
+impl Operator {
+    /// A field on vertices as its values on degrees of freedom: N values in, D out.
+    ///
+    /// # Panics
+    /// If `field` is shorter than N.
+    pub fn on_dofs(&self, field: &[f64]) -> Vec<f64> {
+        self.vertex_of_dof.iter().map(|&vertex| field[vertex as usize]).collect()
+    }
+
+    /// Gives vertices that follow several their value, in fields whose other values are there: K × N, row-major.
+    pub(crate) fn fill_followers(&self, fields: &mut [f64]) {
+        if self.followers.is_empty() {
+            return;
+        }
+        for field in fields.chunks_exact_mut(self.vertex_mass.len()) {
+            for (vertex, weights) in &self.followers {
+                let value = |&(dof, weight): &(u32, f64)| weight * field[self.vertex_of_dof[dof as usize] as usize];
+                field[*vertex as usize] = weights.iter().map(value).sum();
+            }
+        }
+    }
 }
 
 impl Csr {

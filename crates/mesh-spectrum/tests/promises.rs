@@ -143,7 +143,7 @@ proptest! {
         if let Some(distance) = distance {
             prop_assert!(join(&mesh, distance).is_ok_and(|join| join.dofs + join.pairs >= vertices.len()) || distance > 0.01);
         }
-        let Ok(built) = operator(&mesh, &OperatorOptions { join: distance }) else { return Ok(()) };
+        let Ok(built) = operator(&mesh, &OperatorOptions { join: distance, ..Default::default() }) else { return Ok(()) };
         match eigenbasis(&built, &EigenOptions { count, ..Default::default() }, &()) {
             Ok(basis) => {
                 prop_assert!(basis.eigenvalues.iter().chain(&basis.eigenvectors).all(|x| x.is_finite()));

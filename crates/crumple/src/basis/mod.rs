@@ -9,13 +9,14 @@ mod transform;
 use std::ops::Range;
 
 use faer::{Mat, Side};
-use mesh_spectrum::{EigenOptions, OperatorOptions, Watch};
+use mesh_spectrum::{EigenOptions, OperatorError, OperatorOptions, Tie, Watch};
 use serde::{Deserialize, Serialize};
 
 pub(crate) use transform::coefficients_of;
 pub use transform::{coefficients, synthesize};
 
 use crate::Error;
+use crate::joints::Join;
 use crate::reference::Reference;
 use crate::vector::Vector;
 
@@ -24,9 +25,8 @@ use crate::vector::Vector;
 pub struct BasisOptions {
     /// Eigenpairs K. Default 500 (Iza-Teran and Garcke 2018); a mesh with fewer vertices gives as many as it has.
     pub eigenpairs: usize,
-    /// Mutually nearest vertices of different components closer than this become one degree of freedom of the
-    /// operator. Default: components stay apart.
-    pub join: Option<f64>,
+    /// How separate sheets become one. Default: components stay apart.
+    pub join: Option<Join>,
 }
 
 impl Default for BasisOptions {
@@ -57,10 +57,16 @@ pub struct Basis {
 pub struct BasisFacts {
     /// Eigenpairs asked for.
     pub asked: usize,
-    /// Distance of the join, if any.
-    pub join: Option<f64>,
-    /// Pairs of vertices that the join made one.
+    /// How separate sheets were joined, if at all.
+    pub join: Option<Join>,
+    /// Pairs of vertices that the join made one, or ties by which vertices follow others.
     pub joined_pairs: usize,
+    /// Of these ties those that hold nothing more, because others hold their vertex already.
+    #[serde(default)]
+    pub idle_ties: usize,
+    /// Vertices that follow several others, and so have no mass of their own.
+    #[serde(default)]
+    pub followers: usize,
     /// Connected components of the mesh.
     pub components: usize,
     /// Zero eigenvalues: connected components of the operator, after joining.
@@ -92,21 +98,28 @@ pub struct BasisFacts {
 }
 
 impl Basis {
-    /// Computes the eigenbasis of the reference mesh.
+    /// Computes the eigenbasis of the reference mesh; `ties` are what a deck holds of it.
     ///
     /// # Errors
     /// [`Error::Join`], [`Error::Operator`], [`Error::Eigen`], [`Error::Stopped`].
-    pub fn compute(reference: &Reference, options: &BasisOptions, watch: &dyn Watch) -> Result<Self, Error> {
+    pub fn compute(
+        reference: &Reference,
+        ties: &[Tie],
+        options: &BasisOptions,
+        watch: &dyn Watch,
+    ) -> Result<Self, Error> {
         let &BasisOptions { eigenpairs, join } = options;
         if eigenpairs == 0 {
             return Err(Error::Value { name: "-K", value: "0".into(), expected: "at least one eigenpair".into() });
         }
         let inspection = mesh_spectrum::inspect(&reference.mesh);
-        let joined_pairs = join
-            .map(|distance| mesh_spectrum::join(&reference.mesh, distance))
-            .transpose()?
-            .map_or(0, |join| join.pairs);
-        let operator = mesh_spectrum::operator(&reference.mesh, &OperatorOptions { join }).map_err(Error::Operator)?;
+        let distance = join.and_then(Join::distance);
+        let operator =
+            mesh_spectrum::operator(&reference.mesh, &OperatorOptions { join: distance, ties: ties.to_vec() })
+                .map_err(|error| match error {
+                    OperatorError::Join(error) => Error::Join(error),
+                    error => Error::Operator(error),
+                })?;
         let solved =
             mesh_spectrum::eigenbasis(&operator, &EigenOptions { count: eigenpairs, ..Default::default() }, watch)?;
         let eigenvectors: Vec<f32> = solved.eigenvectors.iter().map(|&x| x as f32).collect();
@@ -114,7 +127,9 @@ impl Basis {
         let facts = BasisFacts {
             asked: eigenpairs,
             join,
-            joined_pairs,
+            joined_pairs: operator.pairs_joined + ties.len(),
+            idle_ties: operator.idle_ties,
+            followers: operator.followers.len(),
             components: inspection.components,
             null_space: solved.certificate.components,
             join_advice: inspection.gap.filter(|_| join.is_none()),
@@ -178,10 +193,8 @@ fn length_of(vertices: &[Vector], mass: &[f64]) -> f64 {
 /// Largest ‖Lφ − λMφ‖ in the M⁻¹ norm over λ_K, on the degrees of freedom of the operator.
 fn residual(operator: &mesh_spectrum::Operator, eigenvalues: &[f64], eigenvectors: &[f64]) -> f64 {
     let n = operator.vertex_mass.len();
-    let mut on_dofs = vec![0.0; operator.mass.len()];
     let residuals = eigenvalues.iter().zip(eigenvectors.chunks_exact(n)).map(|(lambda, phi)| {
-        // Vertices that the join made one have the same value.
-        operator.dof_of_vertex.iter().zip(phi).for_each(|(&dof, &x)| on_dofs[dof as usize] = x);
+        let on_dofs = operator.on_dofs(phi);
         let stiff = operator.stiffness.times(&on_dofs);
         let square = |((s, m), x): ((&f64, &f64), &f64)| (s - lambda * m * x).powi(2) / m;
         stiff.iter().zip(&operator.mass).zip(&on_dofs).map(square).sum::<f64>().sqrt()

@@ -10,9 +10,10 @@ use serde::Serialize;
 
 use super::picture::{View, picture};
 use super::shapes::{MeshData, plain, shapes, z_displacement};
-use super::words::{isometry_words, join_words, mode_words, warnings};
+use super::words::{deck_words, isometry_words, join_words, mode_words, warnings};
 use crate::Error;
 use crate::descriptor::{self, DescribeOptions, Described, FIRST_M, Rival, Threshold, describe};
+use crate::joints::Join;
 use crate::modes::{By, Mode, Modes, Tried};
 use crate::reconstruct::Errors;
 use crate::select::Kind;
@@ -46,6 +47,8 @@ struct StudyFacts {
     triangles: usize,
     components: usize,
     joined: Option<f64>,
+    /// What welds and ties of the deck hold, in words, where they joined the pieces.
+    joined_by_deck: Option<String>,
     join_advice: Option<String>,
     eigenpairs: usize,
     length_unit: String,
@@ -240,7 +243,8 @@ fn study_facts(loaded: &Loaded) -> StudyFacts {
         vertices: reference.vertices(),
         triangles: reference.mesh.triangles().len(),
         components: facts.components,
-        joined: facts.join,
+        joined: facts.join.and_then(Join::distance),
+        joined_by_deck: (facts.join == Some(Join::DECK)).then(|| deck_words(facts)),
         join_advice: facts.join_advice.map(|distance| join_words(facts.components, distance, unit)),
         eigenpairs: basis.eigenpairs(),
         length_unit: unit.clone(),
