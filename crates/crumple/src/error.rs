@@ -12,6 +12,23 @@ pub enum Error {
     /// A result file could not be read.
     #[error("{0}")]
     Read(#[from] d3plot::Error),
+    /// A keyword deck could not be read.
+    #[error("{0}")]
+    Deck(#[from] keyword_deck::Error),
+    /// Joining by a deck was asked for, and there is none.
+    #[error("--join deck: {run} is no keyword deck, and none was given")]
+    NoDeck {
+        /// The reference run.
+        run: String,
+    },
+    /// A deck of another model than the surface.
+    #[error("{}: the deck does not belong to this surface: {what}", deck.display())]
+    OtherDeck {
+        /// The deck.
+        deck: PathBuf,
+        /// What differs.
+        what: String,
+    },
     /// A file whose name says that it is a run and whose content does not.
     #[error("{what}")]
     Refused {
@@ -108,6 +125,36 @@ pub enum Error {
     NoCoordinates {
         /// The run.
         run: String,
+    },
+    /// A run whose states do not carry a field.
+    #[error("{run}: its states hold no {field} (they hold {available})")]
+    NoField {
+        /// The run.
+        run: String,
+        /// What was asked for.
+        field: String,
+        /// What the states hold.
+        available: String,
+    },
+    /// A field with values that are no numbers on the surface.
+    #[error("{run}, state {state} (time {time}): {field} is not a number somewhere on the surface")]
+    FieldNotFinite {
+        /// The run.
+        run: String,
+        /// The field.
+        field: String,
+        /// State, counted from 0.
+        state: usize,
+        /// Its time.
+        time: f64,
+    },
+    /// A field that the study does not keep.
+    #[error("the study keeps no field '{asked}'; it keeps {available}")]
+    UnknownField {
+        /// What was asked for.
+        asked: String,
+        /// What there is.
+        available: String,
     },
     /// A run without any whole state.
     #[error("{run}: no whole state{reason}")]
@@ -329,6 +376,9 @@ impl Error {
     pub fn remedy(&self) -> Option<String> {
         let text = match self {
             Self::Read(error) => return error.remedy(),
+            Self::Deck(error) => return error.remedy().map(str::to_owned),
+            Self::NoDeck { .. } => "give the deck with --deck FILE, or join by --join DISTANCE",
+            Self::OtherDeck { .. } => "give the deck that the runs were made from; ids of nodes must be the same",
             Self::Refused { remedy, .. } => return remedy.clone(),
             Self::NoSuchPath(_) => "check the spelling; a run is the root file of a family or its folder",
             Self::NoRuns { .. } => "give the folder that holds the runs, or a run's root file (d3plot)",
@@ -342,6 +392,11 @@ impl Error {
             Self::NotFinite { .. } | Self::TooLarge { .. } => {
                 "the run broke down there; `add --skip-bad` leaves it out"
             }
+            Self::NoField { .. } => "leave the run out (--skip-bad), or make the study without this --field",
+            Self::FieldNotFinite { .. } => {
+                "rigid shells carry no such values: choose parts without them (--part), or make the study without this --field"
+            }
+            Self::UnknownField { .. } => "fields are named when the study is made: `crumple init --field NAME`",
             Self::NoCoordinates { .. } => "write coordinates into the result file (*DATABASE_EXTENT_BINARY: IU = 1)",
             Self::NoStates { .. } => {
                 "the run may not have started, or may have been cut short; copy it again, or leave it out with `add --skip-bad`"

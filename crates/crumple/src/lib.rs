@@ -5,12 +5,15 @@
 //!
 //! | stage | module | from | to |
 //! | --- | --- | --- | --- |
+//! | keyword decks | [`deck`] | a path | mesh, titles, welds |
 //! | open result files, find and name them | [`run`], [`bundle`] | paths | [`run::Run`] |
 //! | input tables | [`inputs`] | CSV | a row a run |
 //! | the surface all runs share | [`mod@reference`] | a run, parts | [`reference::Reference`] |
 //! | the surface of any file | [`surface`] | a mesh file or a run | [`surface::Surface`] |
+//! | what welds and ties hold of it | [`joints`] | a deck | [`joints::Joints`] |
 //! | eigenbasis | [`basis`] | the reference | [`basis::Basis`] |
 //! | how each place has turned | [`rotation`] | a shape | sin θ × axis |
+//! | other quantities on it: plastic strain | [`field`] | a run, a state | a function on the surface |
 //! | coefficients of every state | [`project`] | a run | [`project::Projected`] |
 //! | what is kept on disk | [`study`] | all of it | [`study::Study`] |
 //! | eigenpairs of a surface, alone | [`eigen`] | a surface | [`eigen::Solved`], a file |
@@ -20,7 +23,10 @@
 //! | shape from coefficients | [`reconstruct`] | coefficients | a shape, its errors |
 //! | other methods on the same data | [`rivals`] | displacements | PCA |
 //! | the coefficients that matter | [`descriptor`] | one state | [`descriptor::Descriptor`] |
+//! | the numbers that are compared | [`features`] | a descriptor, coefficients | a few numbers |
 //! | how alike | [`similarity`] | a descriptor, coefficients | a ranking |
+//! | from which similarity on | [`calibrate`] | a descriptor, known runs | a threshold, its error rates |
+//! | which mode, or none | [`classify`] | modes, a state | [`classify::Verdict`] |
 //! | judged against labels | [`compare`] | labels | precision, average precision |
 //! | tables and arrays for others | [`export`] | a study | npy, CSV, Parquet, OBJ, STL |
 //! | one page for a person | [`report`] | a study | HTML |
@@ -29,12 +35,18 @@
 
 pub mod basis;
 pub mod bundle;
+pub mod calibrate;
+pub mod classify;
 pub mod compare;
+pub mod deck;
 pub mod descriptor;
 pub mod eigen;
 mod error;
 pub mod export;
+pub mod features;
+pub mod field;
 pub mod inputs;
+pub mod joints;
 pub mod modes;
 pub mod project;
 pub mod reconstruct;
@@ -48,6 +60,7 @@ pub mod similarity;
 pub mod study;
 pub mod surface;
 pub mod target;
+mod vector;
 
 pub use error::Error;
 pub use mesh_spectrum::{EigenOptions, Kind, Mass, OperatorOptions, UnknownName, Watch};

@@ -32,6 +32,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod coupling;
 mod csr;
 mod eigen;
 mod inspect;
@@ -41,8 +42,9 @@ mod operator;
 mod proximity;
 mod split;
 
+pub use coupling::{CouplingError, Tie};
 pub use eigen::{Certificate, EigenError, EigenOptions, Eigenbasis, InertiaCount, Method, Watch, eigenbasis};
 pub use inspect::{Inspection, Reason, inspect};
-pub use join::{Join, JoinError, join};
+pub use join::{Join, JoinError, join, ties_of};
 pub use mesh::{Mesh, MeshError};
 pub use operator::{Csr, Kind, Mass, Operator, OperatorError, OperatorOptions, UnknownName, operator};

@@ -5,9 +5,10 @@
 //! | L     | `stiffness`   | D × D sparse, symmetric, ≥ 0, L·1 = 0 | 1    |
 //! | M     | `mass`        | D, diagonal, > 0                      | ℓ²   |
 //! |       | `mass_matrix` | D × D sparse, > 0, if M is not diagonal | ℓ² |
-//! |       | `vertex_mass` | N, diagonal, > 0                      | ℓ²   |
+//! |       | `vertex_mass` | N, diagonal, ≥ 0                      | ℓ²   |
 //!
-//! D degrees of freedom for N vertices: D = N, unless vertices of different components are joined.
+//! D degrees of freedom for N vertices: D = N, unless vertices are joined or tied to others ([`Tie`]), whose value they
+//! then have; `vertex_mass` is 0 where a vertex follows several.
 //! Weak form: L φ = λ M φ, so λ is in 1/ℓ² (a pure number with [`Mass::Identity`]). Sign: positive (libigl's
 //! `cotmatrix` is the negative of ours).
 //!
@@ -25,8 +26,9 @@ use thiserror::Error;
 
 pub(crate) use cotan::cotangents;
 
+use crate::coupling::{CouplingError, Reduction, Tie};
 pub use crate::csr::Csr;
-use crate::join::{Join, JoinError, join};
+use crate::join::{JoinError, ties_of};
 use crate::mesh::{Mesh, Union};
 
 /// How the operator is built from the mesh.
@@ -35,6 +37,8 @@ pub struct OperatorOptions {
     /// Join mutually nearest vertices of different components at most this far apart, in the model's length unit
     /// ([`join`](crate::join)). Default `None`: components stay apart, and each adds a zero eigenvalue.
     pub join: Option<f64>,
+    /// Vertices that follow others, taken in their order. Default: none.
+    pub ties: Vec<Tie>,
     /// Which discretisation of the Laplacian. Default [`Kind::Cotan`].
     pub kind: Kind,
     /// Which mass. Default [`Mass::Lumped`].
@@ -79,14 +83,21 @@ pub struct Operator {
     /// M's diagonal, D, ℓ²: a third of the area of each face at a degree of freedom. Where there is a `mass_matrix`, the
     /// sums of its rows.
     pub mass: Vec<f64>,
-    /// N, ℓ²: the same per vertex, for M-products on vertices. Sums to the mesh's area, as `mass` does.
+    /// N, ℓ²: the same per vertex, for M-products on vertices. Sums to the mesh's area, as `mass` does. A vertex that
+    /// follows several has 0 and they have its area.
     pub vertex_mass: Vec<f64>,
     /// M, D × D, where it is not diagonal ([`Mass::Consistent`]).
     pub mass_matrix: Option<Csr>,
-    /// The same on vertices, N × N.
+    /// The same on vertices, N × N, as if none followed another: with Φ's values on all vertices, Φᵀ M Φ = I.
     pub vertex_mass_matrix: Option<Csr>,
-    /// N: the degree of freedom of each vertex.
+    /// N: the degree of freedom of each vertex; the one with the largest weight for a vertex that follows several.
     pub dof_of_vertex: Vec<u32>,
+    /// D: the lowest vertex of each degree of freedom.
+    pub vertex_of_dof: Vec<u32>,
+    /// Vertices that follow several, in rising order, with their weights on degrees of freedom.
+    pub followers: Vec<(u32, Vec<(u32, f64)>)>,
+    /// Ties that hold nothing more, because other ties hold their vertex already.
+    pub idle_ties: usize,
     /// How many pairs of vertices were joined.
     pub pairs_joined: usize,
     /// Connected components after joining, through triangles with area: the dimension of L's null space.
@@ -139,6 +150,9 @@ pub enum OperatorError {
     /// The join distance is not usable.
     #[error(transparent)]
     Join(#[from] JoinError),
+    /// The ties are not usable.
+    #[error(transparent)]
+    Coupling(#[from] CouplingError),
 }
 
 /// What a discretisation makes of a mesh of N vertices.
@@ -202,19 +216,19 @@ impl Elements {
 /// # Errors
 /// A vertex without a triangle that has area; a join distance that is not usable; areas that overflow.
 pub fn operator(mesh: &Mesh, options: &OperatorOptions) -> Result<Operator, OperatorError> {
-    let &OperatorOptions { join: distance, kind, mass: kind_of_mass } = options;
+    let &OperatorOptions { join: distance, ref ties, kind, mass: kind_of_mass } = options;
     let vertices = mesh.vertices().len();
-    let Join { dof_of_vertex, dofs, pairs } = match distance {
-        Some(distance) => join(mesh, distance)?,
-        None => Join { dof_of_vertex: (0..vertices as u32).collect(), dofs: vertices, pairs: 0 },
-    };
+    let near = distance.map_or(Ok(Vec::new()), |distance| ties_of(mesh, distance))?;
+    let all: Vec<Tie> = near.iter().chain(ties).cloned().collect();
+    let reduction = Reduction::new(vertices, &all)?;
+    let dofs = reduction.dofs;
     let consistent = kind_of_mass == Mass::Consistent;
     let elements = match kind {
         Kind::Cotan => cotan::elements(mesh, consistent)?,
         Kind::Tufted => tufted::elements(mesh, consistent)?,
         Kind::Polygon => polygon::elements(mesh, consistent)?,
     };
-    let Elements { mut edges, lumped, mut mass_pairs, mass_diagonal, triangles_without_area, flips } = elements;
+    let Elements { edges, lumped, mass_pairs, mass_diagonal, triangles_without_area, flips } = elements;
     if let Some(vertex) = lumped.iter().position(|&mass| mass <= 0.0 || mass.is_nan()) {
         return Err(match lumped[vertex] {
             0.0 => {
@@ -225,23 +239,17 @@ pub fn operator(mesh: &Mesh, options: &OperatorOptions) -> Result<Operator, Oper
         });
     }
 
-    let vertex_mass_matrix = consistent.then(|| Csr::symmetric(&mass_pairs, mass_diagonal.clone()));
-    let joined = pairs > 0;
-    let mass_matrix = if consistent && joined {
-        let mut diagonal = on_dofs(&mass_diagonal, &dof_of_vertex, dofs);
-        for (i, j, m) in to_dofs(&mut mass_pairs, &dof_of_vertex) {
-            diagonal[i as usize] += 2.0 * m; // two vertices of one degree of freedom
-            debug_assert_eq!(i, j);
-        }
-        Some(Csr::symmetric(&mass_pairs, diagonal))
+    let (vertex_mass_matrix, mass_matrix) = if consistent {
+        let (pairs, diagonal) = reduction.mass(&mass_pairs, &mass_diagonal);
+        (Some(Csr::symmetric(&mass_pairs, mass_diagonal)), Some(Csr::symmetric(&pairs, diagonal)))
     } else {
-        vertex_mass_matrix.clone()
+        (None, None)
     };
-    let vertex_mass = if kind_of_mass == Mass::Identity { vec![1.0; vertices] } else { lumped };
-    let mass = on_dofs(&vertex_mass, &dof_of_vertex, dofs);
-    if joined {
-        to_dofs(&mut edges, &dof_of_vertex);
-    }
+    let each = if kind_of_mass == Mass::Identity { vec![1.0; vertices] } else { lumped };
+    let vertex_mass = reduction.vertex_mass(each);
+    let mut mass = vec![0.0; dofs];
+    reduction.dof_of_vertex.iter().zip(&vertex_mass).for_each(|(&dof, value)| mass[dof as usize] += value);
+    let mut edges = reduction.edges(edges);
     let mut connected = Union::new(dofs);
     edges.iter().for_each(|&(i, j, _)| connected.merge(i, j));
     let (component_of_dof, components) = connected.classes();
@@ -251,27 +259,16 @@ pub fn operator(mesh: &Mesh, options: &OperatorOptions) -> Result<Operator, Oper
         vertex_mass,
         mass_matrix,
         vertex_mass_matrix,
-        dof_of_vertex,
-        pairs_joined: pairs,
+        vertex_of_dof: reduction.vertex_of_dof(),
+        dof_of_vertex: reduction.dof_of_vertex,
+        followers: reduction.followers,
+        idle_ties: reduction.idle,
+        pairs_joined: near.len(),
         components,
         component_of_dof,
         triangles_without_area,
         flips,
     })
-}
-
-/// Sums of a value on vertices over each degree of freedom.
-fn on_dofs(values: &[f64], dof_of_vertex: &[u32], dofs: usize) -> Vec<f64> {
-    let mut sums = vec![0.0; dofs];
-    dof_of_vertex.iter().zip(values).for_each(|(&dof, value)| sums[dof as usize] += value);
-    sums
-}
-
-/// Renames vertices to degrees of freedom. Entries whose ends became one are taken out and returned.
-fn to_dofs(pairs: &mut Vec<(u32, u32, f64)>, dof_of_vertex: &[u32]) -> Vec<(u32, u32, f64)> {
-    let dof = |vertex: u32| dof_of_vertex[vertex as usize];
-    pairs.iter_mut().for_each(|(i, j, _)| (*i, *j) = (dof(*i), dof(*j)));
-    pairs.extract_if(.., |(i, j, _)| i == j).collect()
 }
 
 impl Operator {
@@ -283,6 +280,27 @@ impl Operator {
         match &self.vertex_mass_matrix {
             Some(matrix) => matrix.times(x),
             None => self.vertex_mass.iter().zip(x).map(|(mass, x)| mass * x).collect(),
+        }
+    }
+
+    /// A field on vertices as its values on degrees of freedom: N values in, D out.
+    ///
+    /// # Panics
+    /// If `field` is shorter than N.
+    pub fn on_dofs(&self, field: &[f64]) -> Vec<f64> {
+        self.vertex_of_dof.iter().map(|&vertex| field[vertex as usize]).collect()
+    }
+
+    /// Gives vertices that follow several their value, in fields whose other values are there: K × N, row-major.
+    pub(crate) fn fill_followers(&self, fields: &mut [f64]) {
+        if self.followers.is_empty() {
+            return;
+        }
+        for field in fields.chunks_exact_mut(self.vertex_mass.len()) {
+            for (vertex, weights) in &self.followers {
+                let value = |&(dof, weight): &(u32, f64)| weight * field[self.vertex_of_dof[dof as usize] as usize];
+                field[*vertex as usize] = weights.iter().map(value).sum();
+            }
         }
     }
 }

@@ -6,7 +6,7 @@ use std::time::Instant;
 use clap::Args;
 use crumple::eigen::{self, Precision, Solved};
 use crumple::surface::Surface;
-use crumple::{EigenOptions, Error, Watch};
+use crumple::{EigenOptions, Error, Kind, OperatorOptions, Watch};
 use serde_json::{Map, Value, json};
 
 use super::{Answer, init};
@@ -34,6 +34,10 @@ pub(crate) struct Eigen {
     parts: Vec<String>,
     #[command(flatten)]
     operator: OperatorArgs,
+    /// Treat separate sheets as one: mutually nearest vertices of different pieces of the mesh that are closer than this
+    /// (length unit of the model) share one degree of freedom. A distance is recommended where sheets lie close
+    #[arg(long, value_name = "DISTANCE", allow_negative_numbers = true)]
+    join: Option<f64>,
     /// A pair is accepted when its residual is below this share of the largest eigenvalue, above 0 and below 0.01
     /// [default: 1e-10]
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
@@ -46,7 +50,8 @@ pub(crate) struct Eigen {
 impl Eigen {
     pub(crate) fn run(&self, output: &Output, watch: &dyn Watch) -> Result<Answer, Error> {
         let start = Instant::now();
-        let operator_options = self.operator.options()?;
+        let (kind, mass) = self.operator.kinds()?;
+        let operator_options = OperatorOptions { join: self.join, kind, mass, ..OperatorOptions::default() };
         let default = EigenOptions::default();
         let options = EigenOptions {
             count: self.eigenpairs.unwrap_or(default.count),
@@ -95,7 +100,7 @@ impl Eigen {
         Ok(())
     }
 
-    fn facts(&self, surface: &Surface, solved: &Solved, operator: &crumple::OperatorOptions) -> Value {
+    fn facts(&self, surface: &Surface, solved: &Solved, operator: &OperatorOptions) -> Value {
         let (seen, built, basis) = (&solved.inspection, &solved.operator, &solved.basis);
         let certificate = &basis.certificate;
         json!({
@@ -192,7 +197,7 @@ impl Eigen {
             ));
         }
         let reasons: Vec<String> = seen.reasons.iter().map(ToString::to_string).collect();
-        let tufted = self.operator.options().is_ok_and(|options| options.kind == crumple::Kind::Tufted);
+        let tufted = self.operator.kinds().is_ok_and(|(kind, _)| kind == Kind::Tufted);
         init::tufted(if tufted { &[] } else { &reasons }, output);
     }
 }

@@ -1,8 +1,11 @@
 //! `crumple info`: what a result file holds.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use clap::Args;
+use crumple::deck::{self, DeckInfo};
+use crumple::joints::Join;
 use crumple::run::Run;
 use crumple::study::Study;
 use crumple::{Error, descriptor, modes};
@@ -13,10 +16,10 @@ use crate::output::{Output, table, time};
 
 #[derive(Args)]
 #[command(
-    after_help = "Example, in the repository:\n  crumple info examples/hat-section/runs/run_001\n  crumple info study"
+    after_help = "Example, in the repository:\n  crumple info examples/hat-section/runs/run_001\n  crumple info examples/hat-section/decks/run_001.k\n  crumple info study"
 )]
 pub(crate) struct Info {
-    /// Root file of a family (d3plot), its folder, or a study: then its runs, modes and descriptors
+    /// Root file of a family (d3plot), its folder, a keyword deck, or a study: then its runs, modes and descriptors
     #[arg(value_name = "RUN")]
     run: PathBuf,
 }
@@ -29,7 +32,10 @@ impl Info {
         if self.run.join("manifest.json").is_file() {
             return self.study(output);
         }
-        let info = Run::open("", &self.run)?.info();
+        let run = Run::open("", &self.run)?;
+        let Some(info) = run.info() else {
+            return run.deck().map_or(Ok(Answer::Done), |deck| self.deck(deck::info(deck), output));
+        };
         output.print(&json!(info), || {
             let e = &info.elements;
             let times = match &info.times[..] {
@@ -67,6 +73,49 @@ impl Info {
         Ok(Answer::Done)
     }
 
+    /// What a deck holds.
+    fn deck(&self, info: DeckInfo, output: &Output) -> Result<Answer, Error> {
+        output.print(&json!(info), || {
+            let list = |counts: &mut dyn Iterator<Item = (&str, usize)>| {
+                let words: Vec<String> = counts.map(|(name, count)| format!("{count} {name}")).collect();
+                if words.is_empty() { "none".to_owned() } else { words.join(", ") }
+            };
+            let named = |counts: &BTreeMap<String, usize>| list(&mut counts.iter().map(|(name, count)| (&**name, *count)));
+            let mut sets = info.sets.iter().map(|(name, count)| (*name, *count));
+            let mut skipped: Vec<(&str, u64)> =
+                info.skipped.iter().map(|(keyword, skipped)| (&**keyword, skipped.blocks)).collect();
+            skipped.sort_by_key(|(_, blocks)| std::cmp::Reverse(*blocks));
+            let mut skipped = skipped.into_iter().map(|(keyword, blocks)| (keyword, blocks as usize));
+            let mut text = format!(
+                "{}\n{}, {} files\nnodes     {}\nelements  {}\nsections  {}\nmaterials {}\nsets      {}\nwelds     {}\nties      {}\nskipped   {}\n",
+                if info.title.is_empty() { "(no title)" } else { &info.title },
+                info.format,
+                info.files.len(),
+                info.nodes,
+                named(&info.elements.iter().filter(|(_, count)| **count > 0).map(|(name, count)| (name.replace('_', " "), *count)).collect()),
+                named(&info.sections),
+                info.materials,
+                list(&mut sets),
+                named(&info.connections),
+                named(&info.ties),
+                list(&mut skipped),
+            );
+            let rows = info.parts.iter().map(|part| {
+                let counts = [part.shells, part.solids, part.thick_shells, part.beams];
+                let thickness = part.thickness.map_or_else(|| "–".into(), |thickness| thickness.to_string());
+                let material = part.material.clone().unwrap_or_else(|| "–".into());
+                let counts = counts.map(|count| count.to_string());
+                [part.id.to_string(), part.title.clone()].into_iter().chain(counts).chain([thickness, material]).collect()
+            });
+            text += &table(&["#part", "title", "#shells", "#solids", "#thick shells", "#beams", "#thickness", "material"], rows);
+            for warning in &info.warnings {
+                text += &format!("\nwarning: {}", warning.message);
+            }
+            text
+        });
+        Ok(Answer::Done)
+    }
+
     /// What a study holds.
     fn study(&self, output: &Output) -> Result<Answer, Error> {
         let study = Study::open(&self.run)?;
@@ -79,7 +128,7 @@ impl Info {
         let descriptors = descriptor::list(&study)?;
         let facts = json!({
             "study": study.folder(), "reference": settings.reference, "parts": settings.parts, "join": settings.join,
-            "operator": settings.operator, "mass": settings.mass,
+            "deck": settings.deck, "operator": settings.operator, "mass": settings.mass,
             "vertices": manifest.vertices, "eigenpairs": manifest.eigenpairs, "inputs": manifest.inputs,
             "runs": manifest.runs.keys().collect::<Vec<_>>(), "modes": names, "descriptors": descriptors,
         });
@@ -91,8 +140,13 @@ impl Info {
                 vec![id.clone(), run.times.len().to_string(), time(last), mode, run.path.display().to_string()]
             });
             let or_none = |names: &[String]| if names.is_empty() { "none yet".to_owned() } else { names.join(", ") };
+            let join = match settings.join {
+                None => "not joined".to_owned(),
+                Some(Join::Distance(distance)) => format!("joined within {distance} {}", settings.length_unit),
+                Some(Join::Deck(_)) => "joined by the deck's welds and ties".to_owned(),
+            };
             format!(
-                "study of {} runs on {} vertices, {} eigenpairs ({}, {} mass); reference {}\ndescriptors: {}\n{}",
+                "study of {} runs on {} vertices, {} eigenpairs ({}, {} mass), {join}; reference {}\ndescriptors: {}\n{}",
                 manifest.runs.len(),
                 manifest.vertices,
                 manifest.eigenpairs,

@@ -9,28 +9,34 @@ mod transform;
 
 use std::ops::Range;
 
-use mesh_spectrum::{Csr, EigenOptions, Kind, Mass, OperatorOptions, Watch};
+use faer::{Mat, Side};
+use mesh_spectrum::{Csr, EigenOptions, Kind, Mass, OperatorOptions, Tie, Watch};
 use serde::{Deserialize, Serialize};
 
 pub(crate) use transform::coefficients_of;
 pub use transform::{coefficients, synthesize};
 
 use crate::Error;
+use crate::joints::Join;
 use crate::reference::Reference;
+use crate::vector::Vector;
 
 /// What is asked of the eigenbasis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BasisOptions {
     /// Eigenpairs K. Default 500 (Iza-Teran and Garcke 2018); a mesh with fewer vertices gives as many as it has.
     pub eigenpairs: usize,
-    /// The operator: discretisation, mass, and the distance at which components are joined. Default: cotangent, lumped,
-    /// components stay apart.
-    pub operator: OperatorOptions,
+    /// How separate sheets become one. Default: components stay apart.
+    pub join: Option<Join>,
+    /// Which discretisation of the Laplacian. Default: cotangent.
+    pub kind: Kind,
+    /// Which mass. Default: lumped.
+    pub mass: Mass,
 }
 
 impl Default for BasisOptions {
     fn default() -> Self {
-        Self { eigenpairs: 500, operator: OperatorOptions::default() }
+        Self { eigenpairs: 500, join: None, kind: Kind::default(), mass: Mass::default() }
     }
 }
 
@@ -58,8 +64,8 @@ pub struct Basis {
 pub struct BasisFacts {
     /// Eigenpairs asked for.
     pub asked: usize,
-    /// Distance of the join, if any.
-    pub join: Option<f64>,
+    /// How separate sheets were joined, if at all.
+    pub join: Option<Join>,
     /// Name of the discretisation.
     #[serde(default = "cotan")]
     pub operator: String,
@@ -69,8 +75,14 @@ pub struct BasisFacts {
     /// What speaks for the tufted operator on this mesh; empty where it was used.
     #[serde(default)]
     pub tufted_advice: Vec<String>,
-    /// Pairs of vertices that the join made one.
+    /// Pairs of vertices that the join made one, or ties by which vertices follow others.
     pub joined_pairs: usize,
+    /// Of these ties those that hold nothing more, because others hold their vertex already.
+    #[serde(default)]
+    pub idle_ties: usize,
+    /// Vertices that follow several others, and so have no mass of their own.
+    #[serde(default)]
+    pub followers: usize,
     /// Connected components of the mesh.
     pub components: usize,
     /// Zero eigenvalues: connected components of the operator, after joining.
@@ -79,6 +91,9 @@ pub struct BasisFacts {
     pub join_advice: Option<f64>,
     /// Area of the surface, in length².
     pub area: f64,
+    /// Length of the surface, in length: √12 times its largest standard deviation along a line, which is the length of a
+    /// straight uniform beam.
+    pub length: f64,
     /// Edges with more than two faces.
     pub non_manifold_edges: usize,
     /// Triangles without area, which are left out.
@@ -107,18 +122,24 @@ fn lumped() -> String {
 }
 
 impl Basis {
-    /// Computes the eigenbasis of the reference mesh.
+    /// Computes the eigenbasis of the reference mesh; `ties` are what a deck holds of it.
     ///
     /// # Errors
     /// [`Error::Join`], [`Error::Operator`], [`Error::Eigen`], [`Error::Stopped`].
-    pub fn compute(reference: &Reference, options: &BasisOptions, watch: &dyn Watch) -> Result<Self, Error> {
-        let BasisOptions { eigenpairs, operator: operator_options } = options;
-        let (&eigenpairs, join) = (eigenpairs, operator_options.join);
+    pub fn compute(
+        reference: &Reference,
+        ties: &[Tie],
+        options: &BasisOptions,
+        watch: &dyn Watch,
+    ) -> Result<Self, Error> {
+        let &BasisOptions { eigenpairs, join, kind, mass } = options;
         if eigenpairs == 0 {
             return Err(Error::Value { name: "-K", value: "0".into(), expected: "at least one eigenpair".into() });
         }
         let inspection = mesh_spectrum::inspect(&reference.mesh);
-        let operator = mesh_spectrum::operator(&reference.mesh, operator_options)?;
+        let distance = join.and_then(Join::distance);
+        let operator_options = OperatorOptions { join: distance, ties: ties.to_vec(), kind, mass };
+        let operator = mesh_spectrum::operator(&reference.mesh, &operator_options)?;
         let solved =
             mesh_spectrum::eigenbasis(&operator, &EigenOptions { count: eigenpairs, ..Default::default() }, watch)?;
         let eigenvectors: Vec<f32> = solved.eigenvectors.iter().map(|&x| x as f32).collect();
@@ -126,17 +147,20 @@ impl Basis {
         let facts = BasisFacts {
             asked: eigenpairs,
             join,
-            operator: operator_options.kind.to_string(),
-            mass: operator_options.mass.to_string(),
-            tufted_advice: match operator_options.kind {
+            operator: kind.to_string(),
+            mass: mass.to_string(),
+            tufted_advice: match kind {
                 Kind::Tufted => Vec::new(),
                 _ => inspection.reasons.iter().map(ToString::to_string).collect(),
             },
-            joined_pairs: operator.pairs_joined,
+            joined_pairs: operator.pairs_joined + ties.len(),
+            idle_ties: operator.idle_ties,
+            followers: operator.followers.len(),
             components: inspection.components,
             null_space: solved.certificate.components,
             join_advice: inspection.gap.filter(|_| join.is_none()),
             area: inspection.area,
+            length: length_of(reference.mesh.vertices(), &operator.vertex_mass),
             non_manifold_edges: inspection.non_manifold_edges,
             flat_triangles: inspection.triangles_without_area,
             residual: solved.certificate.residual_max,
@@ -198,14 +222,22 @@ impl Basis {
     }
 }
 
+/// √12 times the largest standard deviation of the surface along a line.
+fn length_of(vertices: &[Vector], mass: &[f64]) -> f64 {
+    let area: f64 = mass.iter().sum();
+    let mean = |of: &dyn Fn(&Vector) -> f64| vertices.iter().zip(mass).map(|(p, m)| m * of(p)).sum::<f64>() / area;
+    let centre: Vector = std::array::from_fn(|c| mean(&|p| p[c]));
+    let covariance = Mat::from_fn(3, 3, |a, b| mean(&|p| (p[a] - centre[a]) * (p[b] - centre[b])));
+    let variances = covariance.self_adjoint_eigenvalues(Side::Lower).unwrap_or_default();
+    (12.0 * variances.last().copied().unwrap_or(0.0)).sqrt()
+}
+
 /// Largest ‖Lφ − λMφ‖ in the M⁻¹ norm over λ_K, on the degrees of freedom of the operator. For a mass that is not diagonal
 /// in the norm of its row sums' inverse, which is at most twice as small.
 fn residual(operator: &mesh_spectrum::Operator, eigenvalues: &[f64], eigenvectors: &[f64]) -> f64 {
     let n = operator.vertex_mass.len();
-    let mut on_dofs = vec![0.0; operator.mass.len()];
     let residuals = eigenvalues.iter().zip(eigenvectors.chunks_exact(n)).map(|(lambda, phi)| {
-        // Vertices that the join made one have the same value.
-        operator.dof_of_vertex.iter().zip(phi).for_each(|(&dof, &x)| on_dofs[dof as usize] = x);
+        let on_dofs = operator.on_dofs(phi);
         let stiff = operator.stiffness.times(&on_dofs);
         let weighed = match &operator.mass_matrix {
             Some(mass) => mass.times(&on_dofs),

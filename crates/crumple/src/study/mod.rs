@@ -6,6 +6,7 @@
 //!   manifest.json           what is in it: files with checksums, a record a run; replaced by rename, last
 //!   mesh.vtu                the reference mesh
 //!   basis.safetensors       eigenvalues, eigenvectors, mass, baseline
+//!   joints.json             what the deck's welds and ties hold; only when joined by a deck
 //!   coefficients/*.parquet  immutable parts, named by content
 //!   runs.parquet            one row a run: the manifest's records as a table, renewed after the manifest
 //!   modes.parquet           the last answer of `modes`
@@ -20,6 +21,7 @@ mod add;
 mod basis_file;
 mod check;
 mod coefficients;
+mod joints_file;
 mod loaded;
 mod manifest;
 mod mesh_file;
@@ -37,7 +39,7 @@ use serde::{Deserialize, Serialize};
 pub use add::{AddOptions, Added};
 pub use check::{Checkup, check};
 pub(crate) use coefficients::triples;
-pub use coefficients::{Coefficients, Function, column_name};
+pub use coefficients::{Coefficients, Function, Need, Stored, column_name};
 pub use loaded::Loaded;
 pub use manifest::{FileRecord, LAYOUT, Manifest, RunRecord};
 pub use mesh_file::write_shape;
@@ -48,6 +50,8 @@ use staged::StagedFolder;
 use crate::Error;
 use crate::basis::{Basis, BasisOptions};
 use crate::error::io;
+use crate::field::Field;
+use crate::joints::{Join, Joints, joints};
 use crate::reference::Reference;
 use crate::run::Run;
 
@@ -70,9 +74,15 @@ pub struct Settings {
     pub parts: Vec<String>,
     /// Eigenpairs asked for.
     pub eigenpairs: usize,
-    /// Distance of the join; absent when components stay apart.
+    /// How separate sheets were joined: a distance, or `deck`; absent when components stay apart.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub join: Option<f64>,
+    pub join: Option<Join>,
+    /// The deck that gave titles and welds, where there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub deck: Option<PathBuf>,
+    /// Quantities of the result files that are projected beside the shape.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fields: Vec<Field>,
     /// The operator: `cotan` (`cotangent` in older studies), `tufted` or `polygon`.
     pub operator: String,
     /// The mass matrix: `lumped`, `consistent` or `identity`.
@@ -103,7 +113,8 @@ pub struct Study {
 }
 
 impl Study {
-    /// Makes a study: reference mesh, operator, eigenbasis. The folder appears when everything is in it.
+    /// Makes a study: reference mesh, operator, eigenbasis. `fields` are what will be projected of each run beside its
+    /// shape; the reference run must carry them. The folder appears when everything is in it.
     ///
     /// # Errors
     /// [`Error::StudyExists`] if there is anything at `folder`, and everything that [`Reference::of_run`] and
@@ -112,6 +123,7 @@ impl Study {
         folder: &Path,
         run: &Run,
         parts: &[String],
+        fields: &[Field],
         options: &BasisOptions,
         watch: &dyn Watch,
     ) -> Result<Self, Error> {
@@ -128,16 +140,23 @@ impl Study {
         // Can it be written at all? Better asked before the eigenbasis than after.
         drop(StagedFolder::beside(folder)?);
         let reference = Reference::of_run(run, parts)?;
-        let mut basis = Basis::compute(&reference, options, watch)?;
+        if !run.times().is_empty() {
+            fields.iter().try_for_each(|field| run.field(*field, 0).map(drop))?;
+        }
+        let joints = joints_of(run, &reference, options)?;
+        let ties = joints.as_ref().map_or(Ok(Vec::new()), |joints| joints_file::ties(joints, &reference, run.id()))?;
+        let mut basis = Basis::compute(&reference, &ties, options, watch)?;
         let staged = StagedFolder::beside(folder)?;
         let settings = Settings {
             reference: run.id().to_owned(),
             reference_path: absolute(run.path()),
             parts: reference.parts.clone(),
             eigenpairs: options.eigenpairs,
-            join: options.operator.join,
-            operator: options.operator.kind.to_string(),
-            mass: options.operator.mass.to_string(),
+            join: options.join,
+            fields: fields.to_vec(),
+            deck: run.deck().map(|deck| absolute(deck.path())),
+            operator: options.kind.to_string(),
+            mass: options.mass.to_string(),
             length_unit: "mm".into(),
             time_unit: "ms".into(),
         };
@@ -145,11 +164,16 @@ impl Study {
         store::write_bytes(&staged.path.join(SETTINGS), text.as_bytes())?;
         mesh_file::write(&reference, &staged.path.join(mesh_file::FILE))?;
         basis_file::write(&basis, &staged.path.join(basis_file::FILE))?;
+        let mut names = vec![SETTINGS, mesh_file::FILE, basis_file::FILE];
+        if let Some(joints) = &joints {
+            joints_file::write(joints, &staged.path.join(joints_file::FILE))?;
+            names.push(joints_file::FILE);
+        }
         for name in [coefficients::FOLDER, DESCRIPTORS] {
             let path = staged.path.join(name);
             std::fs::create_dir(&path).map_err(io("make the folder", &path))?;
         }
-        let files = [SETTINGS, mesh_file::FILE, basis_file::FILE]
+        let files = names
             .into_iter()
             .map(|name| Ok((name.to_owned(), FileRecord::of(&staged.path.join(name))?)))
             .collect::<Result<std::collections::BTreeMap<_, _>, Error>>()?;
@@ -197,11 +221,11 @@ impl Study {
         &self.manifest
     }
 
-    /// Whether the study is what these wishes would make: the same surface, parts, eigenpairs, operator and join.
+    /// Whether the study is what these wishes would make: the same surface, parts, fields, eigenpairs, operator and join.
     ///
     /// # Errors
     /// Those of [`Reference::of_run`] and [`Study::reference`].
-    pub fn is_for(&self, run: &Run, parts: &[String], options: &BasisOptions) -> Result<bool, Error> {
+    pub fn is_for(&self, run: &Run, parts: &[String], fields: &[Field], options: &BasisOptions) -> Result<bool, Error> {
         let reference = Reference::of_run(run, parts)?;
         let same_mesh = || -> Result<bool, Error> {
             let here = self.reference()?;
@@ -210,11 +234,25 @@ impl Study {
                 && here.mesh.vertices() == reference.mesh.vertices())
         };
         Ok(self.settings.eigenpairs == options.eigenpairs
-            && self.settings.join == options.operator.join
-            && self.settings.operator.parse() == Ok(options.operator.kind)
-            && self.settings.mass.parse() == Ok(options.operator.mass)
+            && self.settings.join == options.join
+            && self.settings.operator.parse() == Ok(options.kind)
+            && self.settings.mass.parse() == Ok(options.mass)
+            && self.settings.fields == fields
             && self.settings.parts == reference.parts
-            && same_mesh()?)
+            && same_mesh()?
+            && joints_of(run, &reference, options)?.map(|joints| joints.ties)
+                == self.joints()?.map(|joints| joints.ties))
+    }
+
+    /// What the deck's welds and ties hold, in a study that was joined by a deck.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Damaged`].
+    pub fn joints(&self) -> Result<Option<Joints>, Error> {
+        if self.settings.join != Some(Join::DECK) {
+            return Ok(None);
+        }
+        joints_file::read(&self.folder.join(joints_file::FILE)).map(Some)
     }
 
     /// The reference mesh.
@@ -340,6 +378,22 @@ impl Study {
         self.manifest = Manifest::read(&self.folder)?;
         Ok(())
     }
+}
+
+/// What the run's deck holds of the surface, where joining by it was asked for.
+fn joints_of(run: &Run, reference: &Reference, options: &BasisOptions) -> Result<Option<Joints>, Error> {
+    if options.join != Some(Join::DECK) {
+        return Ok(None);
+    }
+    let deck = run.deck().ok_or_else(|| Error::NoDeck { run: run.id().to_owned() })?;
+    let there: std::collections::HashSet<u64> = deck.node_ids.iter().copied().collect();
+    if let Some(missing) = reference.node_ids.iter().find(|id| !there.contains(id)) {
+        let what = format!("node {missing} of the surface is not in it ({} nodes there)", deck.node_ids.len());
+        return Err(Error::OtherDeck { deck: deck.path().to_owned(), what });
+    }
+    let mut found = joints(deck, reference);
+    found.deck = absolute(&found.deck);
+    Ok(Some(found))
 }
 
 pub(crate) fn absolute(path: &Path) -> PathBuf {

@@ -193,7 +193,8 @@ pub fn eigenbasis(operator: &Operator, options: &EigenOptions, watch: &dyn Watch
     if progress.stopped() {
         return Err(EigenError::Stopped);
     }
-    let basis = basis::merge(operator, &components, &solved, &evidence, next, tolerance);
+    let mut basis = basis::merge(operator, &components, &solved, &evidence, next, tolerance);
+    operator.fill_followers(&mut basis.eigenvectors);
     let Certificate { residual_max: residual, residual_floor: floor, orthogonality: loss, .. } = basis.certificate;
     if residual.is_nan() || residual > tolerance.max(floor) {
         return Err(EigenError::Residual { residual, tolerance, floor });

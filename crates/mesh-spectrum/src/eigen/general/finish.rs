@@ -156,6 +156,7 @@ pub(super) fn finish(
         }
         fix_sign(phi);
     }
+    operator.fill_followers(&mut eigenvectors);
     for (number, pairs) in solved.iter_mut().enumerate() {
         let kept = order.iter().filter(|pair| pair.0 == number).count();
         pairs.eigenvalues.truncate(kept);
