@@ -5,7 +5,7 @@ mod zoo;
 
 use std::f64::consts::PI;
 
-use mesh_spectrum::{Kind, Mass, Mesh, OperatorOptions, operator};
+use mesh_spectrum::{Kind, Mass, Mesh, OperatorOptions, Tie, operator};
 
 const ALL: [(Kind, Mass); 6] = [
     (Kind::Cotan, Mass::Lumped),
@@ -103,17 +103,36 @@ fn the_consistent_mass_bounds_a_flat_plates_eigenvalues_from_above() {
 fn the_two_solvers_for_a_mass_matrix_agree() {
     // In intervals and dense, on a surface with holes, two components, and joined sheets.
     let meshes =
-        [zoo::rough(40, 25), zoo::copies(&zoo::rough(30, 20), 2, 40.0), zoo::tube(6, 30, 1.0), zoo::t_joint(14)];
+        [zoo::rough(40, 25), zoo::copies(&zoo::rough(30, 20), 2, 0.4), zoo::tube(6, 30, 1.0), zoo::t_joint(14)];
     for (number, (vertices, triangles)) in meshes.into_iter().enumerate() {
         let mesh = Mesh::new(vertices, triangles).unwrap();
-        let join = (number == 1).then_some(41.0).filter(|_| false);
+        let join = (number == 1).then_some(0.5); // two sheets become one
         let options = OperatorOptions { mass: Mass::Consistent, join, ..Default::default() };
         let built = operator(&mesh, &options).unwrap();
+        assert_eq!((built.components, built.pairs_joined > 0), (1, number == 1));
         let (sliced, dense) = (zoo::solve(&built, 200), zoo::solve_dense(&built, 200));
         let apart = zoo::distance(&dense.eigenvalues, &sliced.eigenvalues);
         assert!(apart < 1e-11, "mesh {number}: {apart:e}");
         let c = &sliced.certificate;
         assert!(c.complete && c.residual_max < 1e-10 && c.orthogonality < 1e-11, "{c:?}");
+    }
+}
+
+#[test]
+fn a_vertex_that_follows_two_keeps_the_consistent_mass_orthonormal() {
+    let (vertices, triangles) = zoo::rough(20, 16);
+    let mesh = Mesh::new(vertices, triangles).unwrap();
+    let ties = vec![Tie { vertex: 120, to: vec![(60, 0.25), (200, 0.75)] }, Tie { vertex: 7, to: vec![(120, 1.0)] }];
+    for mass in [Mass::Lumped, Mass::Consistent] {
+        let built = operator(&mesh, &OperatorOptions { mass, ties: ties.clone(), ..Default::default() }).unwrap();
+        let options = mesh_spectrum::EigenOptions { count: 30, ..Default::default() };
+        let basis = mesh_spectrum::eigenbasis(&built, &options, &()).unwrap();
+        for phi in basis.eigenvectors.chunks(basis.vertices) {
+            assert!((phi[120] - 0.25 * phi[60] - 0.75 * phi[200]).abs() < 1e-12 && phi[7] == phi[120]);
+            let weighed = built.vertex_mass_times(phi);
+            let square: f64 = phi.iter().zip(&weighed).map(|(x, y)| x * y).sum();
+            assert!((square - 1.0).abs() < 1e-10, "{mass}: {square}");
+        }
     }
 }
 
