@@ -14,6 +14,7 @@
 
 mod spectrum;
 
+pub(crate) use spectrum::TURN_MIN;
 pub use spectrum::{OCTAVES, RotationSpectrum, Ruler};
 
 use faer::{Mat, Side};
