@@ -6,13 +6,13 @@
 //! it, so the weld moves by less than half an edge and no sheet is sheared against the other.
 //!
 //! How far a tie reaches is the solver's rule (manual, general remarks on tied contacts): 0.6 of both thicknesses
-//! together, or a twentieth of the face's shorter diagonal if that is more; with negative SAST or SBST their amounts
+//! together, or a twentieth of the face's diagonal (the triangle's longest side) if that is more; with negative SAST or SBST their amounts
 //! take the place of the thicknesses and nothing else counts.
 
 mod closest;
 mod groups;
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
 
 use keyword_deck::{Deck, Face, Holds, Resolver, Surface, SurfaceKind};
@@ -204,7 +204,6 @@ impl<'a> Finder<'a> {
 
     fn tied_contacts(&mut self) {
         let deck = self.deck;
-        // Nodes of anything that is no shell: only elements that weld ask for their anchors.
         for tie in &deck.ties {
             let source = self.sources.entry(tie.keyword.clone()).or_default();
             source.defined += 1;
@@ -233,7 +232,7 @@ impl<'a> Finder<'a> {
             }
             let mesh = &self.reference.mesh;
             let closest = Closest::new(mesh, &triangles);
-            let twentieth = |triangle: u32| if given { 0.0 } else { 0.05 * self.shorter_diagonal(triangle) };
+            let twentieth = |triangle: u32| if given { 0.0 } else { 0.05 * self.longest_side(triangle) };
             let most_thickness = thickness_of_triangle.values().copied().fold(0.0, f64::max);
             let most_diagonal = triangles.iter().map(|&triangle| twentieth(triangle)).fold(0.0, f64::max);
             let (mut found, mut out_of_reach) = (Vec::new(), 0);
@@ -245,7 +244,7 @@ impl<'a> Finder<'a> {
                 let other = |triangle: u32| vertex.is_none_or(|v| !mesh.triangles()[triangle as usize].contains(&v));
                 let reached = closest.find(position, radius, other).filter(|foot| {
                     let reach = (0.6 * (thickness + thickness_of_triangle[&foot.triangle])).max(twentieth(foot.triangle));
-                    foot.distance <= reach && foot.outside <= 0.05 * self.shorter_diagonal(foot.triangle)
+                    foot.distance <= reach && foot.outside <= 0.05 * self.longest_side(foot.triangle)
                 });
                 match reached {
                     Some(foot) => found.push((node, vertex, foot)),
@@ -270,10 +269,9 @@ impl<'a> Finder<'a> {
         }
     }
 
-    fn shorter_diagonal(&self, triangle: u32) -> f64 {
+    fn longest_side(&self, triangle: u32) -> f64 {
         let mesh = &self.reference.mesh;
         let p = mesh.triangles()[triangle as usize].map(|vertex| mesh.vertices()[vertex as usize]);
-        // Of a triangle or half a quadrilateral: its longest side is a diagonal or as long as a side of the face.
         closest::distance(p[0], p[1]).max(closest::distance(p[1], p[2])).max(closest::distance(p[2], p[0]))
     }
 
@@ -286,16 +284,16 @@ impl<'a> Finder<'a> {
     /// Beams and solids that weld: those of a spot weld's material or formulation.
     fn weld_elements(&mut self) {
         let deck = self.deck;
-        let mut welds: HashMap<u64, bool> = HashMap::new();
+        let mut known: HashMap<u64, bool> = HashMap::new();
         for beam in &deck.beams {
-            if *welds.entry(beam.part).or_insert_with(|| self.resolver.welds(beam.part, &[9])) {
+            if *known.entry(beam.part).or_insert_with(|| welds(&self.resolver, beam.part, &[9])) {
                 let ends = beam.nodes.map(|node| self.anchor(&[node]));
                 self.weld("ELEMENT_BEAM", ends);
             }
         }
-        welds.clear();
+        known.clear();
         for solid in &deck.solids {
-            if *welds.entry(solid.part).or_insert_with(|| self.resolver.welds(solid.part, &[19, 20, 21, 22])) {
+            if *known.entry(solid.part).or_insert_with(|| welds(&self.resolver, solid.part, &[19, 20, 21, 22])) {
                 // Opposite faces; the first pair is the one that the manual asks for.
                 const PAIRS: [[[usize; 4]; 2]; 3] =
                     [[[0, 1, 2, 3], [4, 5, 6, 7]], [[0, 1, 5, 4], [3, 2, 6, 7]], [[0, 3, 7, 4], [1, 2, 6, 5]]];
@@ -437,7 +435,7 @@ impl<'a> Finder<'a> {
             let faces = self.resolver.faces(Surface { kind: SurfaceKind::Part, id });
             let mut triangles: Vec<u32> = self.triangles(&faces, |_| 0.0).into_keys().collect();
             triangles.sort_unstable();
-            (Closest::new(mesh, &triangles), triangles.iter().map(|&t| self.shorter_diagonal(t)).fold(0.0, f64::max))
+            (Closest::new(mesh, &triangles), triangles.iter().map(|&t| self.longest_side(t)).fold(0.0, f64::max))
         });
         let mut found = Vec::new();
         for node in nodes {
@@ -454,22 +452,8 @@ impl<'a> Finder<'a> {
 /// Materials whose elements join others: spot welds, adhesives, cohesive layers.
 const WELD_MATERIALS: &[&str] = &["SPOTWELD", "MAT_100", "COHESIVE", "ADHESIVE", "MAT_138", "MAT_169", "MAT_184", "MAT_185", "MAT_186", "MAT_240"];
 
-/// Whether a part's elements weld.
-trait Welds {
-    fn welds(&self, part: u64, formulations: &[i64]) -> bool;
-}
-
-impl Welds for Resolver<'_> {
-    fn welds(&self, part: u64, formulations: &[i64]) -> bool {
-        let by_material = self.material(part).is_some_and(|name| WELD_MATERIALS.iter().any(|word| name.contains(word)));
-        by_material || formulations.contains(&self.formulation(part))
-    }
-}
-
-/// Nodes of the surface that are tied or followed, for a check that a basis holds them.
-impl Joints {
-    /// User ids of all nodes that follow others.
-    pub fn followers(&self) -> HashSet<u64> {
-        self.ties.iter().map(|tie| tie.node).collect()
-    }
+/// Whether a part's elements weld: by its material, or by the formulation of its section.
+fn welds(resolver: &Resolver<'_>, part: u64, formulations: &[i64]) -> bool {
+    let by_material = resolver.material(part).is_some_and(|name| WELD_MATERIALS.iter().any(|word| name.contains(word)));
+    by_material || formulations.contains(&resolver.formulation(part))
 }
