@@ -85,7 +85,7 @@ fn a_study_of_another_layout() {
     manifest["layout"] = 999.into();
     std::fs::write(&path, manifest.to_string()).unwrap();
     for (_, words) in commands_on(&own.study(), own.around()) {
-        untouched(&own, || ask(&words)).refused(&["study", "layout 999", "layout 1"]).hints("version");
+        untouched(&own, || ask(&words)).refused(&["study", "layout 999", "layout 2"]).hints("version");
     }
 }
 
@@ -511,6 +511,22 @@ fn rules_and_numbers_that_make_no_sense() {
             (&["modes", "STUDY", "--count", "-1"], "-1"),
             (&["modes", "STUDY", "--method", "guess"], "kmeans"),
             (&["modes", "STUDY", "--seed", "x"], "--seed"),
+            (&["modes", "STUDY", "--choose", "taste"], "silhouette or stability"),
+            (&["modes", "STUDY", "--by", "colour"], "rotation, displacement or coordinates"),
+            (&["modes", "STUDY", "--method", "hdbscan", "--count", "3"], "--smallest"),
+            (&["modes", "STUDY", "--method", "hdbscan", "--smallest", "1"], "2 to the number of runs"),
+            (&["modes", "STUDY", "--smallest", "3"], "--method hdbscan"),
+            (&["modes", "STUDY", "--at", "0"], "a time above 0"),
+            (&["modes", "STUDY", "--at", "1000"], "at most"),
+            (&["modes", "STUDY", "--at", "soon"], "soon"),
+            (&["modes", "STUDY", "--at-intrusion", "1.5"], "above 0 and at most 1"),
+            (&["modes", "STUDY", "--states", "first"], "last or series"),
+            (&["modes", "STUDY", "--align", "intrusion"], "--states series"),
+            (&["modes", "STUDY", "--states", "series", "--align", "length"], "time or intrusion"),
+            (&["modes", "STUDY", "--name", "crush"], "MODE=NAME"),
+            (&["modes", "STUDY", "--name", "mode-99=crush"], "no mode 'mode-99'"),
+            (&["modes", "STUDY", "--name", "mode-1=mode-9"], "another name than a number"),
+            (&["modes", "STUDY", "--name", "mode-1=../outside"], "file name"),
             (&["describe", "STUDY", "run_007", "--select", "all"], "difference"),
             (&["describe", "STUDY", "run_007", "--name", "../outside"], "--name"),
             (&["describe", "STUDY", "run_007", "--name", ""], "--name"),

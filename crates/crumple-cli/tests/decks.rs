@@ -14,13 +14,18 @@ fn deck() -> PathBuf {
 #[test]
 fn info_of_a_deck() {
     let told = crumple!["info", deck(), "--json"].done().json();
-    assert_eq!((&told["format"], &told["nodes"], &told["elements"]["shells"]), (&"keyword deck".into(), &1862.into(), &1728.into()));
+    assert_eq!(
+        (&told["format"], &told["nodes"], &told["elements"]["shells"]),
+        (&"keyword deck".into(), &1862.into(), &1728.into())
+    );
     assert_eq!(told["connections"]["CONSTRAINED_NODAL_RIGID_BODY"], 44);
     assert_eq!((&told["parts"][2]["title"], &told["parts"][2]["shells"]), (&"HAT_NOTCH".into(), &16.into()));
     assert_eq!(told["parts"][0]["thickness"], 4.14);
     assert_eq!(told["skipped"]["CONTROL_TIMESTEP"]["blocks"], 1);
     let words = crumple!["info", deck()].done().stdout;
-    for part in ["keyword deck, 1 files", "44 CONSTRAINED_NODAL_RIGID_BODY", "BASE_PLATE_NOTCH", "1 RIGIDWALL_PLANAR_MOVING"] {
+    for part in
+        ["keyword deck, 1 files", "44 CONSTRAINED_NODAL_RIGID_BODY", "BASE_PLATE_NOTCH", "1 RIGIDWALL_PLANAR_MOVING"]
+    {
         assert!(words.contains(part), "{part} in {words}");
     }
 }
@@ -33,7 +38,9 @@ fn a_deck_as_the_reference_and_beside_it_are_one_study() {
     assert_eq!((&made["join"], &made["null_space"], &made["joined_pairs"]), (&"deck".into(), &1.into(), &44.into()));
     assert_eq!(made["joints"]["sources"]["CONSTRAINED_NODAL_RIGID_BODY"]["used"], 44);
     let run = example_run("run_001");
-    let same = crumple!["init", &beside, "--reference", &run, "--deck", deck(), "--join", "deck", "-K", "40", "--json"].done().json();
+    let same = crumple!["init", &beside, "--reference", &run, "--deck", deck(), "--join", "deck", "-K", "40", "--json"]
+        .done()
+        .json();
     assert_eq!((&made["parts"], &made["joined_pairs"]), (&same["parts"], &same["joined_pairs"]));
     let relative = number(&made["eigenvalue_max"]) / number(&same["eigenvalue_max"]) - 1.0;
     assert!(relative.abs() < 1e-6, "{relative}: the result file has its coordinates in single precision");
@@ -61,7 +68,8 @@ fn analyze_by_welds_twice() {
     world::finish(analyze()).done();
     let page = std::fs::read_to_string(study.join("report.html")).unwrap();
     assert!(page.contains("joined to one piece by 44 ties of the deck"));
-    let other = crumple!["analyze", example_run("run_001"), "--join", "2.5", "-K", "60", "-o", &study].refused(&["another join"]);
+    let other = crumple!["analyze", example_run("run_001"), "--join", "2.5", "-K", "60", "-o", &study]
+        .refused(&["another join"]);
     assert_eq!(other.code, Some(2));
 }
 
@@ -81,7 +89,9 @@ fn what_is_no_deck_is_refused_with_a_word() {
     ];
     for (name, bytes, word) in files {
         std::fs::write(path(name), bytes).unwrap();
-        for command in [vec!["info".into(), path(name)], vec!["init".into(), path("study"), "--reference".into(), path(name)]] {
+        for command in
+            [vec!["info".into(), path(name)], vec!["init".into(), path("study"), "--reference".into(), path(name)]]
+        {
             let mut program = world::program();
             program.args(&command);
             let outcome = world::finish(program).refused(&[word, name]);
@@ -90,10 +100,14 @@ fn what_is_no_deck_is_refused_with_a_word() {
         assert!(!path("study").exists());
     }
     std::fs::create_dir(path("folder.k")).unwrap();
-    crumple!["init", path("study"), "--reference", example_run("run_001"), "--deck", path("folder.k")].refused(&["a folder, a keyword deck was expected"]);
-    crumple!["init", path("study"), "--reference", example_run("run_001"), "--deck", path("none.k")].refused(&["no such file"]);
-    crumple!["init", path("study"), "--reference", example_run("run_001"), "--join", "deck"].refused(&["is no keyword deck, and none was given", "--deck FILE"]);
-    crumple!["init", path("study"), "--reference", example_run("run_001"), "--join", "welds"].refused(&["the word deck"]);
+    crumple!["init", path("study"), "--reference", example_run("run_001"), "--deck", path("folder.k")]
+        .refused(&["a folder, a keyword deck was expected"]);
+    crumple!["init", path("study"), "--reference", example_run("run_001"), "--deck", path("none.k")]
+        .refused(&["no such file"]);
+    crumple!["init", path("study"), "--reference", example_run("run_001"), "--join", "deck"]
+        .refused(&["is no keyword deck, and none was given", "--deck FILE"]);
+    crumple!["init", path("study"), "--reference", example_run("run_001"), "--join", "welds"]
+        .refused(&["the word deck"]);
     // A deck without a shell has no surface; a missing include is said, with the places searched.
     std::fs::write(path("missing.k"), "*KEYWORD\n*INCLUDE\nmesh/part.k\n*END\n").unwrap();
     let told = crumple!["info", path("missing.k")].done().stdout;

@@ -18,11 +18,14 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("mesh-spectrum", &[]),
     ("crumple", &["d3plot", "keyword-deck", "mesh-spectrum"]),
     ("crumple-cli", &["crumple"]),
+    ("structures", &[]),
 ];
 
 /// The stages of crates/crumple/src in the order of the flow: each may use those before it.
 const STAGES: &[&str] = &[
     "error",
+    "vector",
+    "field",
     "deck",
     "run",
     "bundle",
@@ -39,7 +42,10 @@ const STAGES: &[&str] = &[
     "reconstruct",
     "rivals",
     "descriptor",
+    "features",
     "similarity",
+    "calibrate",
+    "classify",
     "compare",
     "export",
     "report",
@@ -113,7 +119,7 @@ fn stages_only_use_earlier_ones() {
 #[test]
 fn the_crate_page_names_every_stage() {
     let lib = std::fs::read_to_string(repository().join("crates/crumple/src/lib.rs")).unwrap();
-    for stage in STAGES.iter().filter(|stage| **stage != "error") {
+    for stage in STAGES.iter().filter(|stage| !["error", "vector"].contains(stage)) {
         // `mod@` tells the module from a primitive type of the same name.
         let named = lib.contains(&format!("[`{stage}`]")) || lib.contains(&format!("[`mod@{stage}`]"));
         assert!(named, "{stage} is not in the table");

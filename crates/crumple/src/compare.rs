@@ -8,13 +8,15 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::Error;
-use crate::descriptor::{DescribeOptions, FIRST_M, PCA, Rival, Select, Threshold, choose, describe};
+use crate::descriptor::{DescribeOptions, FIRST_M, PCA, Select, Threshold, choose, describe};
+use crate::features::Features;
 use crate::inputs::Table;
 use crate::modes::{self, By, ModesOptions, Points, adjusted_rand_index};
+use crate::reconstruct::Errors;
 use crate::rivals::Pca;
 use crate::similarity::cosine;
-use crate::study::{Coefficients, Loaded};
-use crate::target::{self, Named, Target};
+use crate::study::{Coefficients, Function, Loaded, Rows};
+use crate::target::{self, Named};
 
 /// Everything `compare` finds.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -34,16 +36,17 @@ pub struct Row {
     pub label: String,
     /// The query run.
     pub query: String,
-    /// Which coefficients: `coordinates` or `difference`.
+    /// Which coefficients: `coordinates`, `difference` or `rotation`.
     pub select: &'static str,
-    /// `descriptor`, `first M`, `first K`, `PCA`.
+    /// `descriptor`, `first M`, `first K`, `PCA`, `rotation spectrum`.
     pub method: String,
-    /// Eigenvectors or components used.
+    /// Eigenvectors or components used; numbers of a rotation spectrum.
     pub size: usize,
-    /// M-weighted RMS error of its reconstruction of the query, in the length unit.
-    pub rms: f64,
+    /// M-weighted RMS error of its reconstruction of the query, in the length unit; null for a rotation spectrum, which
+    /// reconstructs nothing.
+    pub rms: Option<f64>,
     /// Largest error of a vertex, in the length unit.
-    pub max: f64,
+    pub max: Option<f64>,
     /// RMS error over RMS displacement.
     pub relative: Option<f64>,
     /// Share of the nine nearest runs that have the query's label; null without labels.
@@ -67,6 +70,8 @@ pub struct ModesAgreement {
     pub count: usize,
     /// Whether the program chose that number.
     pub chosen: bool,
+    /// Runs without a mode: they are left out of the index.
+    pub without: usize,
     /// Mean silhouette.
     pub silhouette: f64,
     /// Adjusted Rand index over the runs whose label has clear runs.
@@ -95,6 +100,8 @@ pub fn compare(loaded: &Loaded, labels: Option<&Table>, threshold: Threshold) ->
         for (select, arena) in &arenas {
             result.extend(judge_query(loaded, arena, query, *select, threshold)?);
         }
+        let turned = &arenas[0].1;
+        result.push(turned.row(query, Method::Rotation, ROTATION.0, ROTATION.1, turned.spectra[0].len(), None));
     }
     let modes = if labels.is_some() { agreements(loaded, rows, &judge)? } else { Vec::new() };
     Ok(Comparison { rows: result, modes, notes })
@@ -173,7 +180,12 @@ enum Method {
     FirstK,
     /// Scores of as many principal components.
     Components,
+    /// The rotation spectrum.
+    Rotation,
 }
+
+/// Function and name of the rotation spectrum's rows.
+const ROTATION: (&str, &str) = ("rotation", "rotation spectrum");
 
 /// All runs under one choice of coefficients, ready to be ranked by any method with any run as the query.
 struct Arena<'a> {
@@ -185,6 +197,8 @@ struct Arena<'a> {
     chosen: Vec<Vec<usize>>,
     /// Scores of each run on all principal components.
     scores: Vec<Vec<f64>>,
+    /// Rotation spectrum of each run.
+    spectra: Vec<Vec<f64>>,
 }
 
 impl<'a> Arena<'a> {
@@ -197,24 +211,22 @@ impl<'a> Arena<'a> {
     ) -> Result<Self, Error> {
         let pca = Pca::of(rows, rows.rows());
         let delta = |row: usize| rows.triples(row);
+        let options = DescribeOptions { select, threshold, ..Default::default() };
         let chosen = |row: usize| {
-            let target = Target {
-                run: rows.runs[row].clone(),
-                state: rows.states[row] as usize,
-                time: rows.times[row],
-                delta: delta(row),
-                warnings: Vec::new(),
-            };
-            let original = || target::shape(loaded, &Named { run: target.run.clone(), state: None }, &target);
-            Ok(choose(loaded, select, &target.delta, threshold, original)?.eigenvectors)
+            let named = Named { run: rows.runs[row].clone(), state: None };
+            let original = || target::shape(loaded, &named, &target::resolve(loaded, &named)?);
+            Ok(choose(loaded, Function::Displacement, &options, &delta(row), original)?.eigenvectors)
         };
+        let features = Features::rotation(&loaded.basis);
+        let turned = features.read(&loaded.study, Rows::Last)?;
         let all = 0..rows.rows();
         Ok(Self {
             rows,
             judge,
             values: all.clone().map(|row| select.values(&loaded.basis, &delta(row))).collect(),
             chosen: all.clone().into_par_iter().map(chosen).collect::<Result<_, Error>>()?,
-            scores: all.into_par_iter().map(|row| pca.scores(delta(row).as_flattened())).collect(),
+            scores: all.clone().into_par_iter().map(|row| pca.scores(delta(row).as_flattened())).collect(),
+            spectra: all.map(|row| features.vector(&turned.stored(row))).collect(),
         })
     }
 
@@ -225,6 +237,7 @@ impl<'a> Arena<'a> {
             Method::Descriptor => chosen.iter().flat_map(|&j| values[j - 1]).collect(),
             Method::FirstM => values[..chosen.len()].as_flattened().to_vec(),
             Method::FirstK => values.as_flattened().to_vec(),
+            Method::Rotation => self.spectra[row].clone(),
             Method::Components => self.scores[row].iter().copied().take(chosen.len()).collect(),
         }
     }
@@ -253,19 +266,27 @@ impl<'a> Arena<'a> {
         each.iter().sum::<f64>() / each.len().max(1) as f64
     }
 
-    fn row(&self, query: &Query, select: Select, method: Method, rival: &Rival) -> Row {
+    fn row(
+        &self,
+        query: &Query,
+        method: Method,
+        select: &'static str,
+        name: &str,
+        size: usize,
+        errors: Option<Errors>,
+    ) -> Row {
         let order = self.ranking(method, query.medoid);
         let (precision, average) = self.quality(&order, query.index);
         let judged = self.judge.judged;
         Row {
             label: query.label.clone(),
             query: self.rows.runs[query.medoid].clone(),
-            select: select.word(),
-            method: rival.method.clone(),
-            size: rival.size,
-            rms: rival.errors.rms,
-            max: rival.errors.max,
-            relative: rival.errors.relative,
+            select,
+            method: name.to_owned(),
+            size,
+            rms: errors.map(|errors| errors.rms),
+            max: errors.map(|errors| errors.max),
+            relative: errors.and_then(|errors| errors.relative),
             precision_at_9: judged.then_some(precision),
             average_precision: judged.then_some(average),
             mean_average_precision: judged.then(|| self.mean_average_precision(method, query.index)),
@@ -283,10 +304,11 @@ fn judge_query(
     threshold: Threshold,
 ) -> Result<Vec<Row>, Error> {
     let named = Named { run: arena.rows.runs[query.medoid].clone(), state: None };
-    let descriptor = describe(loaded, &named, None, None, &DescribeOptions { select, threshold })?.descriptor;
-    let own = Rival { method: "descriptor".into(), size: descriptor.eigenvectors.len(), errors: descriptor.errors };
-    let mut rows = vec![arena.row(query, select, Method::Descriptor, &own)];
-    for rival in &descriptor.rivals {
+    let options = DescribeOptions { select, threshold, ..Default::default() };
+    let selected = describe(loaded, &named, None, None, &options)?.descriptor.selected;
+    let row = |method, name: &str, size, errors| arena.row(query, method, select.word(), name, size, errors);
+    let mut rows = vec![row(Method::Descriptor, "descriptor", selected.eigenvectors.len(), selected.errors)];
+    for rival in &selected.rivals {
         let method = match rival.method.as_str() {
             FIRST_M => Method::FirstM,
             // PCA sees displacements, so it stands beside the descriptor of displacements.
@@ -294,7 +316,7 @@ fn judge_query(
             PCA => Method::Components,
             _ => Method::FirstK,
         };
-        rows.push(arena.row(query, select, method, rival));
+        rows.push(row(method, &rival.method, rival.size, Some(rival.errors)));
     }
     Ok(rows)
 }
@@ -319,16 +341,20 @@ pub fn average_precision(right: &[bool]) -> f64 {
 fn agreements(loaded: &Loaded, rows: &Coefficients, judge: &Judge) -> Result<Vec<ModesAgreement>, Error> {
     let asked = judge.queries.len();
     let mut result = Vec::new();
-    let methods = [modes::Method::KMeans, modes::Method::Ward, modes::Method::Average];
-    let ways = [By::Rotation, By::Displacement].into_iter().flat_map(|by| methods.map(|method| (by, method)));
+    let ways =
+        [By::Rotation, By::Displacement].into_iter().flat_map(|by| modes::Method::ALL.map(|method| (by, method)));
     for (by, method) in ways {
         for count in [Some(asked), None] {
-            if asked < 2 || asked > rows.rows() {
+            if asked < 2 || asked > rows.rows() || count.is_some() && !method.takes_count() {
                 continue;
             }
             let found = modes::modes(&loaded.study, &ModesOptions { count, method, by, ..Default::default() }, &())?;
+            // Runs that HDBSCAN leaves out agree with nothing and are counted apart.
             let mode_of = |run: &str| {
-                found.modes.iter().position(|mode| mode.members.iter().any(|member| member == run)).unwrap_or(0)
+                found
+                    .modes
+                    .iter()
+                    .position(|mode| mode.members.binary_search_by(|member| member.as_str().cmp(run)).is_ok())
             };
             let index = |keep: &dyn Fn(usize) -> bool| {
                 let pairs: (Vec<usize>, Vec<usize>) = judge
@@ -336,17 +362,19 @@ fn agreements(loaded: &Loaded, rows: &Coefficients, judge: &Judge) -> Result<Vec
                     .iter()
                     .enumerate()
                     .filter_map(|(row, label)| {
-                        label.filter(|&label| keep(label)).map(|label| (mode_of(&rows.runs[row]), label))
+                        label.filter(|&label| keep(label)).and_then(|label| Some((mode_of(&rows.runs[row])?, label)))
                     })
                     .unzip();
                 adjusted_rand_index(&pairs.0, &pairs.1)
             };
-            let silhouette = found.runs.iter().map(|run| run.silhouette).sum::<f64>() / found.runs.len() as f64;
+            let with_mode: Vec<f64> = found.runs.iter().filter_map(|run| run.silhouette).collect();
+            let silhouette = with_mode.iter().sum::<f64>() / with_mode.len().max(1) as f64;
             let queried = |label: usize| judge.queries.iter().any(|query| query.index == label);
             result.push(ModesAgreement {
                 by,
                 method,
                 count: found.modes.len(),
+                without: found.without_mode().len(),
                 chosen: count.is_none(),
                 silhouette,
                 ari: index(&queried),

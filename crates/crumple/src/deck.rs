@@ -16,9 +16,10 @@ const ENDINGS: &[&str] = &["k", "key", "dyn"];
 
 /// Whether a file is a deck: by the ending of its name, or because its first line with something in it is a keyword.
 pub fn is_deck(path: &Path) -> bool {
-    let named = path.extension().and_then(|ending| ending.to_str()).is_some_and(|ending| {
-        ENDINGS.iter().any(|known| ending.eq_ignore_ascii_case(known))
-    });
+    let named = path
+        .extension()
+        .and_then(|ending| ending.to_str())
+        .is_some_and(|ending| ENDINGS.iter().any(|known| ending.eq_ignore_ascii_case(known)));
     path.is_file() && (named || starts_with_a_keyword(path))
 }
 
@@ -31,7 +32,9 @@ fn starts_with_a_keyword(path: &Path) -> bool {
             line.first() == Some(&b'*')
                 && ["KEYWORD", "NODE", "ELEMENT_", "PART", "INCLUDE", "PARAMETER", "TITLE", "SET_", "SECTION_"]
                     .iter()
-                    .any(|word| line[1..].get(..word.len()).is_some_and(|name| name.eq_ignore_ascii_case(word.as_bytes())))
+                    .any(|word| {
+                        line[1..].get(..word.len()).is_some_and(|name| name.eq_ignore_ascii_case(word.as_bytes()))
+                    })
         })
 }
 

@@ -126,6 +126,36 @@ pub enum Error {
         /// The run.
         run: String,
     },
+    /// A run whose states do not carry a field.
+    #[error("{run}: its states hold no {field} (they hold {available})")]
+    NoField {
+        /// The run.
+        run: String,
+        /// What was asked for.
+        field: String,
+        /// What the states hold.
+        available: String,
+    },
+    /// A field with values that are no numbers on the surface.
+    #[error("{run}, state {state} (time {time}): {field} is not a number somewhere on the surface")]
+    FieldNotFinite {
+        /// The run.
+        run: String,
+        /// The field.
+        field: String,
+        /// State, counted from 0.
+        state: usize,
+        /// Its time.
+        time: f64,
+    },
+    /// A field that the study does not keep.
+    #[error("the study keeps no field '{asked}'; it keeps {available}")]
+    UnknownField {
+        /// What was asked for.
+        asked: String,
+        /// What there is.
+        available: String,
+    },
     /// A run without any whole state.
     #[error("{run}: no whole state{reason}")]
     NoStates {
@@ -351,6 +381,11 @@ impl Error {
             Self::NotFinite { .. } | Self::TooLarge { .. } => {
                 "the run broke down there; `add --skip-bad` leaves it out"
             }
+            Self::NoField { .. } => "leave the run out (--skip-bad), or make the study without this --field",
+            Self::FieldNotFinite { .. } => {
+                "rigid shells carry no such values: choose parts without them (--part), or make the study without this --field"
+            }
+            Self::UnknownField { .. } => "fields are named when the study is made: `crumple init --field NAME`",
             Self::NoCoordinates { .. } => "write coordinates into the result file (*DATABASE_EXTENT_BINARY: IU = 1)",
             Self::NoStates { .. } => {
                 "the run may not have started, or may have been cut short; copy it again, or leave it out with `add --skip-bad`"

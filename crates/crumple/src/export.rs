@@ -10,6 +10,7 @@ use crate::descriptor::Descriptor;
 use crate::error::io;
 use crate::modes;
 use crate::study::{Coefficients, Column, Loaded, Rows, column_name, run_columns, store, write_columns};
+use crate::vector::{double_area, square};
 
 /// Formats of tables.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -44,7 +45,7 @@ pub fn export(loaded: &Loaded, folder: &Path, options: &ExportOptions<'_>) -> Re
     let (basis, reference) = (&loaded.basis, &loaded.reference);
     let (k, n, t) = (basis.eigenpairs() as u64, basis.vertices() as u64, reference.mesh.triangles().len() as u64);
     let rows = loaded.study.coefficients(
-        descriptor.map(|descriptor| &descriptor.eigenvectors[..]),
+        descriptor.map(|descriptor| &descriptor.selected.eigenvectors[..]),
         if last { Rows::Last } else { Rows::All },
     )?;
     let path = |name: &str| folder.join(name);
@@ -96,8 +97,10 @@ fn coefficient_columns(rows: &Coefficients) -> Vec<(String, Column)> {
         ("time".to_owned(), Column::Number(rows.times.iter().copied().map(Some).collect())),
     ];
     for (at, &j) in rows.eigenvectors.iter().enumerate() {
-        for component in 0..3 {
-            let values = (0..rows.rows()).map(|row| Some(f64::from(rows.row(row)[3 * at + component]))).collect();
+        let components = rows.function.components();
+        for component in 0..components {
+            let values =
+                (0..rows.rows()).map(|row| Some(f64::from(rows.row(row)[components * at + component]))).collect();
             columns.push((column_name(rows.function, j, component), Column::Number(values)));
         }
     }
@@ -173,9 +176,8 @@ pub fn write_stl(path: &Path, positions: &[[f64; 3]], triangles: &[[u32; 3]]) ->
 }
 
 /// Unit normal; zero for a triangle without area, as STL readers expect.
-fn normal([a, b, c]: [[f64; 3]; 3]) -> [f64; 3] {
-    let (u, v): ([f64; 3], [f64; 3]) = (std::array::from_fn(|i| b[i] - a[i]), std::array::from_fn(|i| c[i] - a[i]));
-    let n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
-    let length = n.iter().map(|x| x * x).sum::<f64>().sqrt();
+fn normal(corners: [[f64; 3]; 3]) -> [f64; 3] {
+    let n = double_area(corners);
+    let length = square(n).sqrt();
     if length > 0.0 { n.map(|x| x / length) } else { [0.0; 3] }
 }

@@ -12,6 +12,7 @@
 //! | what welds and ties hold of it | [`joints`] | a deck | [`joints::Joints`] |
 //! | eigenbasis | [`basis`] | the reference | [`basis::Basis`] |
 //! | how each place has turned | [`rotation`] | a shape | sin θ × axis |
+//! | other quantities on it: plastic strain | [`field`] | a run, a state | a function on the surface |
 //! | coefficients of every state | [`project`] | a run | [`project::Projected`] |
 //! | what is kept on disk | [`study`] | all of it | [`study::Study`] |
 //! | a state that the user names | [`target`] | `run_007@3` | [`target::Target`] |
@@ -20,7 +21,10 @@
 //! | shape from coefficients | [`reconstruct`] | coefficients | a shape, its errors |
 //! | other methods on the same data | [`rivals`] | displacements | PCA |
 //! | the coefficients that matter | [`descriptor`] | one state | [`descriptor::Descriptor`] |
+//! | the numbers that are compared | [`features`] | a descriptor, coefficients | a few numbers |
 //! | how alike | [`similarity`] | a descriptor, coefficients | a ranking |
+//! | from which similarity on | [`calibrate`] | a descriptor, known runs | a threshold, its error rates |
+//! | which mode, or none | [`classify`] | modes, a state | [`classify::Verdict`] |
 //! | judged against labels | [`compare`] | labels | precision, average precision |
 //! | tables and arrays for others | [`export`] | a study | npy, CSV, Parquet, OBJ, STL |
 //! | one page for a person | [`report`] | a study | HTML |
@@ -29,11 +33,15 @@
 
 pub mod basis;
 pub mod bundle;
+pub mod calibrate;
+pub mod classify;
 pub mod compare;
 pub mod deck;
 pub mod descriptor;
 mod error;
 pub mod export;
+pub mod features;
+pub mod field;
 pub mod inputs;
 pub mod joints;
 pub mod modes;
@@ -48,6 +56,7 @@ pub mod select;
 pub mod similarity;
 pub mod study;
 pub mod target;
+mod vector;
 
 pub use error::Error;
 pub use mesh_spectrum::Watch;

@@ -7,11 +7,16 @@
 use faer::Mat;
 use mesh_spectrum::Watch;
 
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
 use crate::Error;
 use crate::basis::{Basis, coefficients_of};
-use crate::reference::Reference;
+use crate::field::Field;
+use crate::reference::{Placement, Reference};
 use crate::rotation;
 use crate::run::Run;
+use crate::vector::{Vector, area, distance, square, subtract};
 
 /// A run, projected.
 #[derive(Debug, Clone)]
@@ -24,6 +29,30 @@ pub struct Projected {
     pub content: String,
     /// What was noticed, in words.
     pub warnings: Vec<String>,
+    /// Where the time went.
+    pub spent: Spent,
+}
+
+/// Time that projecting took, by what it was spent on.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Spent {
+    /// Reading positions and fields, and making sure that they are numbers.
+    pub reading: Duration,
+    /// Displacements, their coefficients and the measures.
+    pub displacement: Duration,
+    /// Rotation fields and their coefficients.
+    pub rotation: Duration,
+    /// Coefficients of other fields.
+    pub fields: Duration,
+}
+
+impl std::ops::AddAssign for Spent {
+    fn add_assign(&mut self, other: Self) {
+        self.reading += other.reading;
+        self.displacement += other.displacement;
+        self.rotation += other.rotation;
+        self.fields += other.fields;
+    }
 }
 
 /// One state, projected.
@@ -35,6 +64,8 @@ pub struct ProjectedState {
     pub delta: Vec<f32>,
     /// ρ = Φᵀ M r of the rotation field r, K × 3, row-major, in length; f32.
     pub rotation: Vec<f32>,
+    /// Coefficients of the fields that the study keeps, K × components each; f32.
+    pub fields: Vec<(Field, Vec<f32>)>,
     /// What else is known about the state.
     pub measures: Measures,
 }
@@ -43,9 +74,10 @@ impl ProjectedState {
     /// Whether every number is one that can be stored: a run that exploded has finite coordinates and coefficients
     /// beyond what f32 holds.
     fn is_finite(&self) -> bool {
-        let Measures { rms, max, captured, rigid_share, strain_median, strain_p95 } = self.measures;
-        self.delta.iter().chain(&self.rotation).all(|x| x.is_finite())
-            && [self.time, rms, max, captured, rigid_share, strain_median, strain_p95].iter().all(|x| x.is_finite())
+        let fields = self.fields.iter().flat_map(|(_, values)| values);
+        self.time.is_finite()
+            && self.delta.iter().chain(&self.rotation).chain(fields).all(|x| x.is_finite())
+            && Measures::COLUMNS.iter().all(|(_, of)| of(&self.measures).is_finite())
     }
 }
 
@@ -64,6 +96,27 @@ pub struct Measures {
     pub strain_median: f64,
     /// 95 % quantile of |edge strain|.
     pub strain_p95: f64,
+    /// Median of |area of a triangle over its undeformed area − 1|.
+    pub area_median: f64,
+    /// 95 % quantile of the same.
+    pub area_p95: f64,
+    /// Root mean square of sin θ of the rotation field over the surface: how much the surface turned, 0 to 1.
+    pub turn: f64,
+}
+
+impl Measures {
+    /// Every measure by its column's name.
+    pub(crate) const COLUMNS: [(&str, fn(&Self) -> f64); 9] = [
+        ("rms", |m| m.rms),
+        ("max", |m| m.max),
+        ("captured", |m| m.captured),
+        ("rigid_share", |m| m.rigid_share),
+        ("strain_median", |m| m.strain_median),
+        ("strain_p95", |m| m.strain_p95),
+        ("area_median", |m| m.area_median),
+        ("area_p95", |m| m.area_p95),
+        ("turn", |m| m.turn),
+    ];
 }
 
 /// States are projected in batches of at most this many bytes of shapes, displacements and rotations.
@@ -73,80 +126,178 @@ const BATCH_BYTES: usize = 256 << 20;
 ///
 /// # Errors
 /// As [`Projector::project`].
-pub fn project(run: &Run, reference: &Reference, basis: &Basis, watch: &dyn Watch) -> Result<Projected, Error> {
-    Projector::new(reference, basis).project(run, watch)
+pub fn project(
+    run: &Run,
+    reference: &Reference,
+    basis: &Basis,
+    fields: &[Field],
+    watch: &dyn Watch,
+) -> Result<Projected, Error> {
+    Projector::new(reference, basis, fields).project(run, watch)
 }
 
 /// Projects runs on one basis.
 pub struct Projector<'a> {
     reference: &'a Reference,
     basis: &'a Basis,
+    fields: &'a [Field],
     geometry: Geometry<'a>,
+    /// Where the last run's nodes and shells were: the next run of a bundle mostly has the same mesh.
+    placed: Mutex<Option<(blake3::Hash, Arc<Placement>)>>,
 }
 
 impl<'a> Projector<'a> {
-    /// Prepares what all runs share.
-    pub fn new(reference: &'a Reference, basis: &'a Basis) -> Self {
-        Self { reference, basis, geometry: Geometry::of(reference, basis) }
+    /// Prepares what all runs share. `fields`: projected beside displacement and rotation.
+    pub fn new(reference: &'a Reference, basis: &'a Basis, fields: &'a [Field]) -> Self {
+        Self { reference, basis, fields, geometry: Geometry::of(reference, basis), placed: Mutex::default() }
     }
 
     /// Projects every whole state of a run. Memory is bounded whatever the number of states.
     ///
     /// # Errors
     /// [`Error::OtherMesh`], [`Error::NotFinite`], [`Error::TooLarge`], [`Error::NoStates`], [`Error::NoCoordinates`],
-    /// [`Error::Stopped`] and reading errors.
+    /// [`Error::NoField`], [`Error::FieldNotFinite`], [`Error::Stopped`] and reading errors.
     pub fn project(&self, run: &Run, watch: &dyn Watch) -> Result<Projected, Error> {
-        let Self { reference, basis, geometry } = self;
         let mut warnings = run.warnings();
         if run.times().is_empty() {
             let reason = if warnings.is_empty() { String::new() } else { format!(": {}", warnings.join("; ")) };
             return Err(Error::NoStates { run: run.id().to_owned(), reason });
         }
-        let placement = reference.place(run)?;
-        if placement.offset_max > 1e-3 * geometry.edge_mean {
+        let placement = self.place(run)?;
+        if placement.offset_max > 1e-3 * self.geometry.edge_mean {
             warnings.push(format!("undeformed positions differ from the reference run's by up to {:.2e}; displacements count from the reference", placement.offset_max));
         }
-        let batch = (BATCH_BYTES / (72 * basis.vertices())).clamp(1, 64);
+        let functions = 3 + self.fields.len();
+        let batch = (BATCH_BYTES / (24 * functions * self.basis.vertices())).clamp(1, 64);
         let mut hash = blake3::Hasher::new();
+        let mut spent = Spent::default();
         let mut states = Vec::with_capacity(run.times().len());
         for first in (0..run.times().len()).step_by(batch) {
             if watch.stopped() {
                 return Err(Error::Stopped);
             }
             let last = (first + batch).min(run.times().len());
-            let mut shapes = Vec::with_capacity(last - first);
-            for state in first..last {
-                let shape = reference.shape(run, &placement, state)?;
-                hash.update(&run.times()[state].to_le_bytes());
-                let bytes: Vec<u8> = shape.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
-                hash.update(&bytes);
-                shapes.push(shape);
-            }
-            let displacements: Vec<Vec<[f64; 3]>> = shapes.iter().map(|shape| geometry.displacement(shape)).collect();
-            let turned: Vec<Vec<[f64; 3]>> = shapes
-                .iter()
-                .map(|shape| rotation::field(reference.mesh.triangles(), reference.mesh.vertices(), shape))
-                .collect();
-            let deltas = coefficients_of(basis, &displacements);
-            let rotations = coefficients_of(basis, &turned);
-            let narrow = |values: &[[f64; 3]]| values.iter().flatten().map(|&x| x as f32).collect();
-            for (at, (delta, rotation)) in deltas.iter().zip(&rotations).enumerate() {
-                let projected = ProjectedState {
-                    time: run.times()[first + at],
-                    delta: narrow(delta),
-                    rotation: narrow(rotation),
-                    measures: geometry.measures(&shapes[at], &displacements[at], delta),
-                };
-                if !projected.is_finite() {
-                    return Err(Error::TooLarge { run: run.id().to_owned(), state: first + at, time: projected.time });
-                }
-                states.push(projected);
-            }
+            states.extend(self.batch(run, &placement, first..last, &mut hash, &mut spent)?);
         }
         if let Some(last) = states.last() {
             warnings.extend(last.measures.warnings());
         }
-        Ok(Projected { run: run.id().to_owned(), states, content: hash.finalize().to_hex().to_string(), warnings })
+        Ok(Projected {
+            run: run.id().to_owned(),
+            states,
+            content: hash.finalize().to_hex().to_string(),
+            warnings,
+            spent,
+        })
+    }
+
+    /// Projects one state of a run that may still be growing.
+    ///
+    /// # Errors
+    /// As [`Projector::project`].
+    pub fn state(&self, run: &Run, state: usize) -> Result<ProjectedState, Error> {
+        let placement = self.place(run)?;
+        let found =
+            self.batch(run, &placement, state..state + 1, &mut blake3::Hasher::new(), &mut Spent::default())?.pop();
+        found.ok_or_else(|| Error::Internal("a batch of one state is empty".into()))
+    }
+
+    /// Projects a few states together; the block of Φ that is being read serves all of them.
+    fn batch(
+        &self,
+        run: &Run,
+        placement: &Placement,
+        states: std::ops::Range<usize>,
+        hash: &mut blake3::Hasher,
+        spent: &mut Spent,
+    ) -> Result<Vec<ProjectedState>, Error> {
+        let Self { reference, basis, geometry, .. } = self;
+        let mut clock = Clock::start();
+        let mut shapes = Vec::with_capacity(states.len());
+        let mut quantities: Vec<Vec<Vec<Vector>>> = vec![Vec::new(); self.fields.len()];
+        for state in states.clone() {
+            let shape = reference.shape(run, placement, state)?;
+            hash.update(&run.times()[state].to_le_bytes());
+            let bytes: Vec<u8> = shape.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
+            hash.update(&bytes);
+            shapes.push(shape);
+            for (field, values) in self.fields.iter().zip(&mut quantities) {
+                values.push(reference.field(run, placement, *field, state)?);
+            }
+        }
+        clock.lap(&mut spent.reading);
+        let displacements: Vec<Vec<Vector>> = shapes.iter().map(|shape| geometry.displacement(shape)).collect();
+        let deltas = coefficients_of(basis, &displacements);
+        let mut measures: Vec<Measures> =
+            (0..shapes.len()).map(|at| geometry.measures(&shapes[at], &displacements[at], &deltas[at])).collect();
+        clock.lap(&mut spent.displacement);
+        let turned: Vec<Vec<Vector>> = shapes
+            .iter()
+            .map(|shape| rotation::field(reference.mesh.triangles(), reference.mesh.vertices(), shape))
+            .collect();
+        let rotations = coefficients_of(basis, &turned);
+        measures
+            .iter_mut()
+            .zip(&turned)
+            .for_each(|(measures, turned)| measures.turn = geometry.mean_square(turned).sqrt());
+        clock.lap(&mut spent.rotation);
+        let quantities: Vec<Vec<Vec<Vector>>> =
+            quantities.iter().map(|values| coefficients_of(basis, values)).collect();
+        clock.lap(&mut spent.fields);
+        let narrow = |values: &[Vector]| values.iter().flatten().map(|&x| x as f32).collect();
+        let mut projected = Vec::with_capacity(shapes.len());
+        for (at, state) in states.enumerate() {
+            let fields = self.fields.iter().zip(&quantities).map(|(field, values)| {
+                let leading = |triple: &Vector| triple[..field.components()].to_vec();
+                (*field, values[at].iter().flat_map(leading).map(|x| x as f32).collect())
+            });
+            let found = ProjectedState {
+                time: run.times()[state],
+                delta: narrow(&deltas[at]),
+                rotation: narrow(&rotations[at]),
+                fields: fields.collect(),
+                measures: measures[at],
+            };
+            if !found.is_finite() {
+                return Err(Error::TooLarge { run: run.id().to_owned(), state, time: found.time });
+            }
+            projected.push(found);
+        }
+        Ok(projected)
+    }
+
+    /// Where the run's nodes and shells are; kept for the next run, which mostly has the same mesh.
+    fn place(&self, run: &Run) -> Result<Arc<Placement>, Error> {
+        let mut hasher = blake3::Hasher::new();
+        let mut numbers = |bytes: Vec<u8>| {
+            hasher.update(&bytes);
+        };
+        numbers(run.node_ids().iter().flat_map(|id| id.to_le_bytes()).collect());
+        numbers(run.undeformed().iter().flatten().flat_map(|x| x.to_le_bytes()).collect());
+        numbers(run.faces().flat_map(|(face, _)| face).flat_map(u32::to_le_bytes).collect());
+        let mesh = hasher.finalize();
+        let kept = self.placed.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        if let Some((_, placement)) = kept.filter(|(kept, _)| *kept == mesh) {
+            return Ok(placement);
+        }
+        let placement = Arc::new(self.reference.place(run)?);
+        *self.placed.lock().unwrap_or_else(PoisonError::into_inner) = Some((mesh, Arc::clone(&placement)));
+        Ok(placement)
+    }
+}
+
+/// Adds the time since the last lap to a sum.
+struct Clock(Instant);
+
+impl Clock {
+    fn start() -> Self {
+        Self(Instant::now())
+    }
+
+    fn lap(&mut self, sum: &mut Duration) {
+        let now = Instant::now();
+        *sum += now - self.0;
+        self.0 = now;
     }
 }
 
@@ -172,7 +323,10 @@ impl Measures {
 
 /// Undeformed positions and edges, once for all runs.
 struct Geometry<'a> {
-    undeformed: &'a [[f64; 3]],
+    undeformed: &'a [Vector],
+    triangles: &'a [[u32; 3]],
+    /// Areas of the triangles, T.
+    areas: Vec<f64>,
     mass: &'a [f64],
     area: f64,
     /// Σ m |p⁰ − centre|²: the size of the part.
@@ -196,11 +350,13 @@ impl<'a> Geometry<'a> {
         let length = |a: u32, b: u32| distance(undeformed[a as usize], undeformed[b as usize]);
         let edges: Vec<_> = ends.into_iter().map(|(a, b)| (a, b, length(a, b))).filter(|edge| edge.2 > 0.0).collect();
         let edge_mean = edges.iter().map(|edge| edge.2).sum::<f64>() / edges.len().max(1) as f64;
-        let (mass, area) = (&basis.mass[..], basis.mass.iter().sum());
-        let mut geometry = Self { undeformed, mass, area, spread: 0.0, edges, edge_mean };
+        let mass = &basis.mass[..];
+        let triangles = reference.mesh.triangles();
+        let areas = triangles.iter().map(|corners| area(corners.map(|vertex| undeformed[vertex as usize]))).collect();
+        let mut geometry =
+            Self { undeformed, triangles, areas, mass, area: mass.iter().sum(), spread: 0.0, edges, edge_mean };
         let centre = geometry.centre(undeformed);
-        let square = |p: &[f64; 3]| (0..3).map(|c| (p[c] - centre[c]).powi(2)).sum::<f64>();
-        geometry.spread = undeformed.iter().zip(mass).map(|(p, m)| m * square(p)).sum();
+        geometry.spread = undeformed.iter().zip(mass).map(|(p, m)| m * square(subtract(*p, centre))).sum();
         geometry
     }
 
@@ -210,23 +366,26 @@ impl<'a> Geometry<'a> {
     }
 
     fn displacement(&self, shape: &[[f64; 3]]) -> Vec<[f64; 3]> {
-        shape.iter().zip(self.undeformed).map(|(p, q)| std::array::from_fn(|c| p[c] - q[c])).collect()
+        shape.iter().zip(self.undeformed).map(|(p, q)| subtract(*p, *q)).collect()
+    }
+
+    /// Mean over the surface of |f|².
+    fn mean_square(&self, values: &[Vector]) -> f64 {
+        values.iter().zip(self.mass).map(|(f, m)| m * square(*f)).sum::<f64>() / self.area
     }
 
     fn measures(&self, shape: &[[f64; 3]], displacement: &[[f64; 3]], delta: &[[f64; 3]]) -> Measures {
-        let square = |d: &[f64; 3]| d.iter().map(|x| x * x).sum::<f64>();
-        let norm2: f64 = displacement.iter().zip(self.mass).map(|(d, m)| m * square(d)).sum();
-        let max = displacement.iter().map(square).fold(0.0, f64::max).sqrt();
-        let caught: f64 = delta.iter().map(square).sum();
-        let mut strains: Vec<f64> = self
-            .edges
-            .iter()
-            .map(|&(a, b, length)| (distance(shape[a as usize], shape[b as usize]) / length - 1.0).abs())
-            .collect();
-        let mut quantile = |share: f64| {
-            let at = ((strains.len() as f64 - 1.0) * share).round() as usize;
-            if strains.is_empty() { 0.0 } else { *strains.select_nth_unstable_by(at, f64::total_cmp).1 }
+        let norm2 = self.mean_square(displacement) * self.area;
+        let max = displacement.iter().map(|d| square(*d)).fold(0.0, f64::max).sqrt();
+        let caught: f64 = delta.iter().map(|d| square(*d)).sum();
+        let strain =
+            |&(a, b, length): &(u32, u32, f64)| (distance(shape[a as usize], shape[b as usize]) / length - 1.0).abs();
+        let mut strains: Vec<f64> = self.edges.iter().map(strain).collect();
+        let stretch = |(corners, from): (&[u32; 3], &f64)| {
+            (area(corners.map(|vertex| shape[vertex as usize])) / from - 1.0).abs()
         };
+        let with_area = self.triangles.iter().zip(&self.areas).filter(|(_, area)| **area > 0.0);
+        let mut stretches: Vec<f64> = with_area.map(stretch).collect();
         Measures {
             rms: (norm2 / self.area).sqrt(),
             max,
@@ -237,8 +396,12 @@ impl<'a> Geometry<'a> {
             } else {
                 0.0
             },
-            strain_median: quantile(0.5),
-            strain_p95: quantile(0.95),
+            strain_median: quantile(&mut strains, 0.5),
+            strain_p95: quantile(&mut strains, 0.95),
+            area_median: quantile(&mut stretches, 0.5),
+            area_p95: quantile(&mut stretches, 0.95),
+            // Known once the rotation field is.
+            turn: 0.0,
         }
     }
 
@@ -249,8 +412,7 @@ impl<'a> Geometry<'a> {
         let mut s = [[0.0; 3]; 3];
         let mut spread = 0.0;
         for ((p, q), m) in self.undeformed.iter().zip(shape).zip(self.mass) {
-            let (p, q): ([f64; 3], [f64; 3]) =
-                (std::array::from_fn(|c| p[c] - p0[c]), std::array::from_fn(|c| q[c] - q0[c]));
+            let (p, q) = (subtract(*p, p0), subtract(*q, q0));
             for i in 0..3 {
                 for j in 0..3 {
                     s[i][j] += m * p[i] * q[j];
@@ -275,6 +437,8 @@ impl<'a> Geometry<'a> {
     }
 }
 
-fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
-    (0..3).map(|c| (a[c] - b[c]).powi(2)).sum::<f64>().sqrt()
+/// The value below which this share of the values lies; 0 of none.
+fn quantile(values: &mut [f64], share: f64) -> f64 {
+    let at = ((values.len() as f64 - 1.0) * share).round() as usize;
+    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(at, f64::total_cmp).1 }
 }

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::basis::{Basis, synthesize};
 use crate::reference::Reference;
 use crate::select::Select;
+use crate::vector::{add, square, subtract};
 
 /// How far a reconstruction is from the original.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -44,12 +45,12 @@ pub fn reconstruct(
 
 /// p⁰ + d, N × 3.
 pub fn displaced(reference: &Reference, displacement: &[[f64; 3]]) -> Vec<[f64; 3]> {
-    reference.mesh.vertices().iter().zip(displacement).map(|(p, d)| std::array::from_fn(|c| p[c] + d[c])).collect()
+    reference.mesh.vertices().iter().zip(displacement).map(|(p, d)| add(*p, *d)).collect()
 }
 
 /// Compares a reconstruction with the original, both N × 3.
 pub fn errors(reference: &Reference, basis: &Basis, original: &[[f64; 3]], reconstruction: &[[f64; 3]]) -> Errors {
-    let square = |a: &[f64; 3], b: &[f64; 3]| (0..3).map(|c| (a[c] - b[c]).powi(2)).sum::<f64>();
+    let square = |a: &[f64; 3], b: &[f64; 3]| square(subtract(*a, *b));
     let area: f64 = basis.mass.iter().sum();
     let rms = |a: &[[f64; 3]], b: &[[f64; 3]]| {
         let sum: f64 = a.iter().zip(b).zip(&basis.mass).map(|((a, b), mass)| mass * square(a, b)).sum();
@@ -59,4 +60,16 @@ pub fn errors(reference: &Reference, basis: &Basis, original: &[[f64; 3]], recon
     let error = rms(original, reconstruction);
     let max = original.iter().zip(reconstruction).map(|(a, b)| square(a, b)).fold(0.0, f64::max).sqrt();
     Errors { rms: error, max, relative: (displacement > 0.0).then(|| error / displacement) }
+}
+
+/// The same for a field, both N × 3, in the field's unit; `relative` is over the field's own root mean square.
+pub fn field_errors(basis: &Basis, original: &[[f64; 3]], reconstruction: &[[f64; 3]]) -> Errors {
+    let difference: Vec<_> = original.iter().zip(reconstruction).map(|(a, b)| subtract(*a, *b)).collect();
+    let area: f64 = basis.mass.iter().sum();
+    let rms = |values: &[[f64; 3]]| {
+        (values.iter().zip(&basis.mass).map(|(x, mass)| mass * square(*x)).sum::<f64>() / area).sqrt()
+    };
+    let (own, error) = (rms(original), rms(&difference));
+    let max = difference.iter().map(|x| square(*x)).fold(0.0, f64::max).sqrt();
+    Errors { rms: error, max, relative: (own > 0.0).then(|| error / own) }
 }

@@ -4,12 +4,14 @@
 //! belongs to the mesh by node ids and connectivity. The part of an element does not matter there: a notch may be a
 //! part of its own in one run and none in the next.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 
 use mesh_spectrum::Mesh;
 
 use crate::Error;
-use crate::run::Run;
+use crate::field::Field;
+use crate::run::{FieldValues, Run};
+use crate::vector::{Vector, area, distance, double_area};
 
 /// The surface, with what is needed to find it again in another run.
 #[derive(Debug, Clone)]
@@ -29,6 +31,8 @@ pub struct Reference {
 pub struct Placement {
     /// For each vertex of the mesh the index of its node in the run, N.
     pub node_of_vertex: Vec<u32>,
+    /// For each triangle of the mesh the index of its shell in the run, T.
+    pub shell_of_triangle: Vec<u32>,
     /// Largest distance between the undeformed positions in the run and in the reference, in the length unit.
     pub offset_max: f64,
 }
@@ -94,20 +98,25 @@ impl Reference {
             })
             .collect::<Result<_, _>>()?;
         let ids = run.node_ids();
-        let there: HashSet<FaceKey> =
-            run.faces().map(|(face, _)| face_key(face.map(|node| ids[node as usize]))).collect();
-        for key in self.face_keys() {
-            if !there.contains(&key) {
+        let there: HashMap<FaceKey, u32> = run
+            .faces()
+            .zip(0..)
+            .map(|((face, _), shell)| (face_key(face.map(|node| ids[node as usize])), shell))
+            .collect();
+        let mut shell_of_triangle = Vec::with_capacity(self.mesh.triangles().len());
+        for (key, triangles) in self.face_keys() {
+            let Some(&shell) = there.get(&key) else {
                 return Err(other(format!(
                     "no shell of the run joins nodes {}",
                     key.map(|id| id.to_string()).join(", ")
                 )));
-            }
+            };
+            shell_of_triangle.extend(std::iter::repeat_n(shell, triangles));
         }
         let undeformed = run.undeformed();
         let offset = |(vertex, &node): (usize, &u32)| distance(self.mesh.vertices()[vertex], undeformed[node as usize]);
         let offset_max = node_of_vertex.iter().enumerate().map(offset).fold(0.0, f64::max);
-        Ok(Placement { node_of_vertex, offset_max })
+        Ok(Placement { node_of_vertex, shell_of_triangle, offset_max })
     }
 
     /// Positions of the mesh's vertices in one state of a run, N × 3.
@@ -131,22 +140,56 @@ impl Reference {
         Ok(shape)
     }
 
+    /// A field on the vertices in one state of a run, N × 3; scalars have their value in the first place and zeros behind
+    /// it. Values of shells go to the vertices by area: f_v = Σ A_t f_t / Σ A_t over the triangles t at v.
+    ///
+    /// # Errors
+    /// [`Error::NoField`] where the run does not carry it, [`Error::FieldNotFinite`], reading errors.
+    pub fn field(&self, run: &Run, placement: &Placement, field: Field, state: usize) -> Result<Vec<[f64; 3]>, Error> {
+        let values = match run.field(field, state)? {
+            FieldValues::Nodes(values) => placement.node_of_vertex.iter().map(|&node| values[node as usize]).collect(),
+            FieldValues::Shells(values) => self.to_vertices(placement, &values),
+        };
+        if values.as_flattened().iter().all(|x| x.is_finite()) {
+            return Ok(values);
+        }
+        Err(Error::FieldNotFinite {
+            run: run.id().to_owned(),
+            field: field.to_string(),
+            state,
+            time: run.times()[state],
+        })
+    }
+
+    /// Means of the values of the shells around each vertex, weighted by area.
+    fn to_vertices(&self, placement: &Placement, values: &[f64]) -> Vec<[f64; 3]> {
+        let mut sums = vec![[0.0; 3]; self.vertices()];
+        let mut areas = vec![0.0; self.vertices()];
+        for (triangle, &shell) in self.mesh.triangles().iter().zip(&placement.shell_of_triangle) {
+            let area = area(triangle.map(|vertex| self.mesh.vertices()[vertex as usize]));
+            for &vertex in triangle {
+                sums[vertex as usize][0] += area * values[shell as usize];
+                areas[vertex as usize] += area;
+            }
+        }
+        sums.iter_mut().zip(&areas).filter(|(_, area)| **area > 0.0).for_each(|(sum, area)| sum[0] /= area);
+        sums
+    }
+
     /// The triangles of each face, by its node ids.
     pub(crate) fn triangles_of_face(&self) -> HashMap<FaceKey, Vec<u32>> {
         let mut triangles: HashMap<FaceKey, Vec<u32>> = HashMap::new();
         let mut next = 0;
-        for key in self.face_keys() {
-            let face = self.shell_of_triangle[next];
-            let own = (next..self.shell_of_triangle.len()).take_while(|&at| self.shell_of_triangle[at] == face);
-            let own: Vec<u32> = own.take(2).map(|at| at as u32).collect();
-            next += own.len();
-            triangles.entry(key).or_default().extend(own);
+        for (key, count) in self.face_keys() {
+            triangles.entry(key).or_default().extend(next..next + count as u32);
+            next += count as u32;
         }
         triangles
     }
 
-    /// The input faces, each by its node ids; a quad is put together again from its two triangles.
-    fn face_keys(&self) -> Vec<FaceKey> {
+    /// The input faces in order, each by its node ids, with the number of its triangles; a quad is put together again
+    /// from its two.
+    fn face_keys(&self) -> Vec<(FaceKey, usize)> {
         let ids_of = |triangle: &[u32; 3]| triangle.map(|vertex| self.node_ids[vertex as usize]);
         let mut keys = Vec::new();
         let mut triangles = self.mesh.triangles().iter().zip(&self.shell_of_triangle).peekable();
@@ -154,14 +197,11 @@ impl Reference {
             let [a, b, c] = ids_of(triangle);
             let other_half = triangles.next_if(|(_, next)| *next == face).map(|(triangle, _)| ids_of(triangle));
             let fourth = other_half.and_then(|ids| ids.into_iter().find(|id| ![a, b, c].contains(id)));
-            keys.push(face_key([a, b, c, fourth.unwrap_or(c)]));
+            let count = 1 + usize::from(other_half.is_some());
+            keys.push((face_key([a, b, c, fourth.unwrap_or(c)]), count));
         }
         keys
     }
-}
-
-fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
-    (0..3).map(|c| (a[c] - b[c]).powi(2)).sum::<f64>().sqrt()
 }
 
 fn choose_parts(run: &Run, all: &[crate::run::Part], asked: &[String]) -> Result<Vec<bool>, Error> {
@@ -191,13 +231,10 @@ fn choose_parts(run: &Run, all: &[crate::run::Part], asked: &[String]) -> Result
 }
 
 fn has_area(points: &[[f64; 3]], &[a, b, c, d]: &[u32; 4]) -> bool {
-    let area = |a: u32, b: u32, c: u32| {
-        let [p, q, r] = [a, b, c].map(|node| points[node as usize]);
-        let (u, v): ([f64; 3], [f64; 3]) = (std::array::from_fn(|i| q[i] - p[i]), std::array::from_fn(|i| r[i] - p[i]));
-        (u[1] * v[2] - u[2] * v[1]).abs() + (u[2] * v[0] - u[0] * v[2]).abs() + (u[0] * v[1] - u[1] * v[0]).abs()
-    };
+    let no_area =
+        |a: u32, b: u32, c: u32| double_area([a, b, c].map(|node| points[node as usize])) == Vector::default();
     // A coordinate that is not a number is left for the mesh to name.
-    !(area(a, b, c) == 0.0 && area(a, c, d) == 0.0)
+    !(no_area(a, b, c) && no_area(a, c, d))
 }
 
 /// New index of each node (`u32::MAX` for unused ones), and the used nodes in rising order.

@@ -24,7 +24,7 @@ pub struct Pca {
 impl Pca {
     /// The first `components` principal components of the rows; fewer where the rows do not span as many.
     pub fn of(rows: &Coefficients, components: usize) -> Self {
-        let (count, width) = (rows.rows(), 3 * rows.eigenvectors.len());
+        let (count, width) = (rows.rows(), rows.width());
         let mut mean = vec![0.0; width];
         for row in 0..count {
             rows.row(row).iter().zip(&mut mean).for_each(|(&x, mean)| *mean += f64::from(x) / count as f64);

@@ -11,6 +11,7 @@ use serde::Serialize;
 
 use crate::Error;
 use crate::deck::{self, Surface};
+use crate::field::{Field, Layer, Quantity};
 
 /// An opened result file. Opening reads headers and geometry; states are read when asked for.
 pub struct Run {
@@ -24,7 +25,19 @@ pub struct Run {
 enum Source {
     D3plot(Box<d3plot::Family>),
     /// A mesh without states.
-    Deck { deck: Arc<Deck>, surface: Surface },
+    Deck {
+        deck: Arc<Deck>,
+        surface: Surface,
+    },
+}
+
+/// A field as a result file holds it.
+#[derive(Debug, Clone, PartialEq)]
+pub enum FieldValues {
+    /// Of the nodes, nodes × 3; scalars have zeros in the second and third place.
+    Nodes(Vec<[f64; 3]>),
+    /// Of the shells, in the order of [`Run::faces`]. NaN for rigid shells, which have no words.
+    Shells(Vec<f64>),
 }
 
 /// What a result file holds.
@@ -213,16 +226,16 @@ impl Run {
     pub fn parts(&self) -> Vec<Part> {
         let mut parts: Vec<Part> = match &self.source {
             Source::D3plot(family) => {
-                let part =
-                    |part: &d3plot::Part| Part { id: part.id, title: part.title.trim().to_owned(), shells: part.shells };
+                let part = |part: &d3plot::Part| Part {
+                    id: part.id,
+                    title: part.title.trim().to_owned(),
+                    shells: part.shells,
+                };
                 family.parts().iter().map(part).collect()
             }
             Source::Deck { deck, .. } => {
-                let part = |part: keyword_deck::PartRow| Part {
-                    id: part.id,
-                    title: part.title,
-                    shells: part.elements.shells,
-                };
+                let part =
+                    |part: keyword_deck::PartRow| Part { id: part.id, title: part.title, shells: part.elements.shells };
                 deck.part_table().into_iter().map(part).collect()
             }
         };
@@ -322,5 +335,30 @@ impl Run {
             Source::D3plot(family) => family.coordinates(state)?.ok_or_else(none),
             Source::Deck { .. } => Err(none()),
         }
+    }
+
+    /// A field in one state.
+    ///
+    /// # Errors
+    /// [`Error::NoField`] if the states do not hold it, [`Error::Read`] if the file cannot be read there.
+    pub fn field(&self, field: Field, state: usize) -> Result<FieldValues, Error> {
+        let missing = |available: String| Error::NoField { run: self.id.clone(), field: field.to_string(), available };
+        let Source::D3plot(family) = &self.source else { return Err(missing("nothing: it is a deck".into())) };
+        let layers = match field.layer {
+            Layer::Max => d3plot::Layers::Max,
+            Layer::Min => d3plot::Layers::Min,
+            Layer::Mean => d3plot::Layers::Mean,
+            Layer::Inner => d3plot::Layers::Inner,
+            Layer::Outer => d3plot::Layers::Outer,
+        };
+        let values = match field.quantity {
+            Quantity::PlasticStrain => family.shell_plastic_strain(state, layers)?.map(FieldValues::Shells),
+            Quantity::Temperature => family
+                .temperature(state)?
+                .map(|values| FieldValues::Nodes(values.into_iter().map(|x| [x, 0.0, 0.0]).collect())),
+            Quantity::Velocity => family.velocity(state)?.map(FieldValues::Nodes),
+            Quantity::Acceleration => family.acceleration(state)?.map(FieldValues::Nodes),
+        };
+        values.ok_or_else(|| missing(family.fields().iter().map(|field| field.name).collect::<Vec<_>>().join(", ")))
     }
 }

@@ -1,7 +1,11 @@
-//! Which coefficients are looked at: those of the coordinates, α, or those of the displacement, δ.
+//! Which coefficients are looked at: the rotation field's spectrum or, as in the paper, those of the coordinates, α, or
+//! of the displacement, δ.
+
+use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
+use crate::Error;
 use crate::basis::Basis;
 
 /// Which coefficients a method looks at.
@@ -35,6 +39,39 @@ impl Select {
         match self {
             Self::Coordinates => "coordinates",
             Self::Difference => "difference",
+        }
+    }
+}
+
+/// Which numbers say how a state deformed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// The spectrum of the rotation field: what kind of deformation it is wherever it happens, and which way it goes.
+    #[default]
+    Rotation,
+    /// The paper's: coefficients on the eigenvectors that matter most for the target.
+    Paper,
+}
+
+impl Kind {
+    /// As a word.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Rotation => "rotation",
+            Self::Paper => "paper",
+        }
+    }
+}
+
+impl FromStr for Kind {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self, Error> {
+        match text {
+            "rotation" => Ok(Self::Rotation),
+            "paper" => Ok(Self::Paper),
+            _ => Err(Error::Value { name: "--kind", value: text.into(), expected: "rotation or paper".into() }),
         }
     }
 }

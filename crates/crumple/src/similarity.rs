@@ -11,12 +11,17 @@ use faer::{Mat, Side};
 use serde::Serialize;
 
 use crate::Error;
-use crate::descriptor::{Descriptor, Select};
-use crate::study::{Coefficients, Loaded, Rows};
+use crate::descriptor::Descriptor;
+use crate::features::{Features, Samples};
+use crate::select::Kind;
+use crate::study::{Loaded, Rows, Stored};
+use crate::target::Target;
 
 /// What is compared, and how.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SimilarityOptions {
+    /// Which numbers are compared. Default: the descriptor's own kind.
+    pub kind: Option<Kind>,
     /// Subtract the mean of the last states of all runs first. Default: no, as in the paper.
     pub centred: bool,
     /// Weights of the coefficients. Default: none, as in the paper.
@@ -76,17 +81,15 @@ pub struct Hit {
 /// Compares states with one descriptor.
 #[derive(Debug, Clone)]
 pub struct Comparer {
-    eigenvectors: Vec<usize>,
-    /// α⁰ on J where coordinates are compared, else zero; 3|J|.
-    offset: Vec<f64>,
-    /// What is subtracted, 3|J|.
+    features: Features,
+    /// What is subtracted, one a feature.
     centre: Vec<f64>,
-    /// What is multiplied, 3|J|.
+    /// What is multiplied, one a feature.
     weights: Vec<f64>,
-    /// The target after all that, 3|J|.
+    /// The target after all that.
     target: Vec<f64>,
     metric: Metric,
-    /// 1 / √area: turns length² into an RMS length.
+    /// Turns features into root mean square lengths: 1 / √area for coefficients.
     to_length: f64,
     /// Inverse of the shrunk covariance.
     precision: Option<Mat<f64>>,
@@ -96,83 +99,89 @@ impl Comparer {
     /// Prepares the comparison with a descriptor.
     ///
     /// # Errors
-    /// [`Error::TooFewRuns`] where the options need the study's statistics and there are fewer than two runs.
+    /// [`Error::TooFewRuns`] where the options need the study's statistics and there are fewer than two runs;
+    /// [`Error::Value`] for a weight that the kind does not have.
     pub fn new(loaded: &Loaded, descriptor: &Descriptor, options: SimilarityOptions) -> Result<Self, Error> {
-        let needs_study = options.centred || options.weight == Weight::Spread || options.metric == Metric::Mahalanobis;
-        let rows = if needs_study {
-            Some(loaded.study.coefficients(Some(&descriptor.eigenvectors), Rows::Last)?)
-        } else {
-            None
-        };
-        Self::with_rows(loaded, descriptor, options, rows.as_ref())
-    }
-
-    /// The same with the study's last states on J already at hand.
-    fn with_rows(
-        loaded: &Loaded,
-        descriptor: &Descriptor,
-        options: SimilarityOptions,
-        rows: Option<&Coefficients>,
-    ) -> Result<Self, Error> {
-        let SimilarityOptions { centred, weight, metric } = options;
+        let SimilarityOptions { kind, centred, weight, metric } = options;
         let basis = &loaded.basis;
-        let j = &descriptor.eigenvectors;
-        if let Some(&beyond) = j.iter().find(|&&j| j > basis.eigenpairs()) {
-            return Err(Error::Value {
-                name: "descriptor",
-                value: format!("eigenvector {beyond}"),
-                expected: format!("at most {}", basis.eigenpairs()),
-            });
-        }
-        let needed = if metric == Metric::Mahalanobis { 3 } else { 2 };
-        if let Some(have) = rows.map(Coefficients::rows).filter(|&rows| rows < needed) {
-            return Err(Error::TooFewRuns { what: "centring, spread or Mahalanobis", needed, have });
-        }
-        let offset: Vec<f64> = match descriptor.select {
-            Select::Coordinates => j.iter().flat_map(|&j| basis.baseline[j - 1]).collect(),
-            Select::Difference => vec![0.0; 3 * j.len()],
+        let kind = kind.unwrap_or(descriptor.kind);
+        let features = Features::of(basis, descriptor, kind)?;
+        let target = features.target(descriptor);
+        let needs_study = centred || weight == Weight::Spread || metric == Metric::Mahalanobis;
+        let values = if needs_study {
+            let samples = features.read(&loaded.study, Rows::Last)?;
+            let needed = if metric == Metric::Mahalanobis { 3 } else { 2 };
+            if samples.rows() < needed {
+                let have = samples.rows();
+                return Err(Error::TooFewRuns { what: "centring, spread or Mahalanobis", needed, have });
+            }
+            (0..samples.rows()).map(|row| features.vector(&samples.stored(row))).collect()
+        } else {
+            Vec::new()
         };
-        let values: Option<Vec<Vec<f64>>> =
-            rows.map(|rows| (0..rows.rows()).map(|row| add(rows.row(row), &offset)).collect());
-        let mean = values.as_deref().map(mean_of);
-        let spread = values.as_deref().zip(mean.as_deref()).map(|(values, mean)| spread_of(values, mean));
-        let weights = match (weight, spread) {
-            (Weight::Frequency, _) => j.iter().flat_map(|&j| [basis.eigenvalues[j - 1].max(0.0).sqrt(); 3]).collect(),
-            // A coefficient that never varies says nothing; dividing by its zero spread would make it say everything.
-            (Weight::Spread, Some(spread)) => {
+        let mean = mean_of(&values);
+        let weights = match weight {
+            Weight::None => vec![1.0; target.len()],
+            Weight::Frequency => features.frequencies().ok_or_else(|| Error::Value {
+                name: "--weight",
+                value: "frequency".into(),
+                expected: "none or spread: numbers of the rotation spectrum belong to bands, not to one eigenvalue (or --kind paper)".into(),
+            })?,
+            // A number that never varies says nothing; dividing by its zero spread would make it say everything.
+            Weight::Spread => {
+                let spread = spread_of(&values, &mean);
                 let most = spread.iter().copied().fold(0.0, f64::max);
                 // Below a hundred thousandth of the largest it is the rounding of single-precision files that varies.
                 spread.iter().map(|&s| if s > 1e-5 * most { 1.0 / s } else { 0.0 }).collect()
             }
-            _ => vec![1.0; 3 * j.len()],
         };
-        let centre = if centred { mean.unwrap_or_default() } else { vec![0.0; 3 * j.len()] };
-        let mut comparer = Self {
-            eigenvectors: j.clone(),
-            offset,
-            centre,
-            weights,
-            target: Vec::new(),
-            metric,
-            to_length: 1.0 / basis.facts.area.sqrt(),
-            precision: None,
+        let centre = if centred { mean } else { vec![0.0; target.len()] };
+        let to_length = match kind {
+            Kind::Rotation => 1.0,
+            Kind::Paper => 1.0 / basis.facts.area.sqrt(),
         };
-        comparer.target = comparer.transform(descriptor.values.iter().flatten().copied().collect());
+        let mut comparer = Self { features, centre, weights, target: Vec::new(), metric, to_length, precision: None };
+        comparer.target = comparer.transform(target);
         if metric == Metric::Mahalanobis {
-            let values = values.unwrap_or_default().into_iter().map(|row| comparer.transform(row)).collect::<Vec<_>>();
+            let values = values.into_iter().map(|row| comparer.transform(row)).collect::<Vec<_>>();
             comparer.precision = Some(shrunk_precision(&values));
         }
         Ok(comparer)
     }
 
-    /// The eigenvectors whose δ [`Comparer::score`] expects.
-    pub fn eigenvectors(&self) -> &[usize] {
-        &self.eigenvectors
+    /// What has to be read for [`Comparer::score`].
+    pub fn features(&self) -> &Features {
+        &self.features
     }
 
-    /// Compares one state. `delta`: δ on J, 3|J|.
-    pub fn score(&self, delta: &[f32]) -> Score {
-        let value = self.transform(add(delta, &self.offset));
+    /// Compares a state that was named or projected.
+    ///
+    /// # Errors
+    /// [`Error::UnknownField`] if it lacks what is compared.
+    pub fn score_target(&self, target: &Target) -> Result<Score, Error> {
+        let numbers = self.numbers(target)?;
+        Ok(self.score_numbers(numbers))
+    }
+
+    /// The numbers of a state that was named or projected, as they are compared but for centring and weights.
+    ///
+    /// # Errors
+    /// [`Error::UnknownField`] if it lacks what is compared.
+    pub fn numbers(&self, target: &Target) -> Result<Vec<f64>, Error> {
+        let needs = self.features.needs();
+        let values: Vec<Vec<f32>> = needs.iter().map(|need| target.on(need)).collect::<Result<_, _>>()?;
+        let stored: Vec<Stored<'_>> =
+            needs.iter().zip(&values).map(|(need, values)| Stored { values, rms: target.rms(need.function) }).collect();
+        Ok(self.features.vector(&stored))
+    }
+
+    /// Compares one state. `stored`: one entry for each of [`Features::needs`].
+    pub fn score(&self, stored: &[Stored<'_>]) -> Score {
+        self.score_numbers(self.features.vector(stored))
+    }
+
+    fn score_numbers(&self, numbers: Vec<f64>) -> Score {
+        let value = self.transform(numbers);
         match self.metric {
             Metric::Cosine => {
                 let similarity = cosine(&self.target, &value);
@@ -201,6 +210,19 @@ impl Comparer {
         }
         values
     }
+
+    /// Every state of these rows against the target, best first.
+    fn rank(&self, samples: &Samples) -> Vec<Hit> {
+        let hit = |row: usize| Hit {
+            run: samples.run(row).to_owned(),
+            state: samples.state(row),
+            time: samples.time(row),
+            score: self.score(&samples.stored(row)),
+        };
+        let mut hits: Vec<Hit> = (0..samples.rows()).map(hit).collect();
+        rank(&mut hits, self.metric);
+        hits
+    }
 }
 
 /// Ranks states by likeness to a descriptor, best first. `rows`: the last state of every run, or every state.
@@ -214,17 +236,7 @@ pub fn search(
     rows: Rows<'_>,
 ) -> Result<Vec<Hit>, Error> {
     let comparer = Comparer::new(loaded, descriptor, options)?;
-    let rows = loaded.study.coefficients(Some(comparer.eigenvectors()), rows)?;
-    let mut hits: Vec<Hit> = (0..rows.rows())
-        .map(|row| Hit {
-            run: rows.runs[row].clone(),
-            state: rows.states[row],
-            time: rows.times[row],
-            score: comparer.score(rows.row(row)),
-        })
-        .collect();
-    rank(&mut hits, options.metric);
-    Ok(hits)
+    Ok(comparer.rank(&comparer.features.read(&loaded.study, rows)?))
 }
 
 /// Best first; ties by run and state.
@@ -254,10 +266,6 @@ pub fn cosine(a: &[f64], b: &[f64]) -> f64 {
     (ab / (aa * bb).sqrt()).clamp(-1.0, 1.0)
 }
 
-fn add(delta: &[f32], offset: &[f64]) -> Vec<f64> {
-    delta.iter().zip(offset).map(|(&x, offset)| f64::from(x) + offset).collect()
-}
-
 fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a - b).collect()
 }
@@ -266,6 +274,7 @@ fn norm(a: &[f64]) -> f64 {
     a.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
+/// Mean of the rows; empty of none.
 fn mean_of(rows: &[Vec<f64>]) -> Vec<f64> {
     let mut mean = vec![0.0; rows.first().map_or(0, Vec::len)];
     for row in rows {

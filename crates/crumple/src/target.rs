@@ -6,9 +6,12 @@ use std::path::Path;
 use crate::Error;
 use crate::basis::coefficients;
 use crate::bundle;
-use crate::project::project;
+use crate::field::Field;
+use crate::project::{ProjectedState, project};
+use crate::rotation;
 use crate::run::Run;
-use crate::study::{Loaded, Rows, Study, triples};
+use crate::study::{Function, Loaded, Need, Rows, Study, triples};
+use crate::vector::{Vector, subtract};
 
 /// A run and a state as they were written.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -30,11 +33,34 @@ pub struct Target {
     pub time: f64,
     /// δ, K × 3.
     pub delta: Vec<[f64; 3]>,
+    /// ρ of the rotation field, K × 3.
+    pub rotation: Vec<[f64; 3]>,
+    /// Root mean square displacement over the surface, in the length unit.
+    pub rms: f64,
+    /// Root mean square of sin θ of the rotation field over the surface.
+    pub turn: f64,
+    /// Coefficients of the fields that the study keeps, K × components each.
+    pub fields: Vec<(Field, Vec<f32>)>,
     /// What was noticed about the run: a cut file, a displacement that is mostly rigid.
     pub warnings: Vec<String>,
 }
 
 impl Target {
+    /// A state that was just projected.
+    pub(crate) fn of_state(run: String, state: usize, found: ProjectedState, warnings: Vec<String>) -> Self {
+        Self {
+            run,
+            state,
+            time: found.time,
+            delta: triples(&found.delta),
+            rotation: triples(&found.rotation),
+            rms: found.measures.rms,
+            turn: found.measures.turn,
+            fields: found.fields,
+            warnings,
+        }
+    }
+
     /// What makes this state hard to compare with a descriptor's: warnings about its run, and another time.
     pub fn caveats(&self, descriptor_time: f64) -> Vec<String> {
         let mut caveats = self.warnings.clone();
@@ -47,10 +73,52 @@ impl Target {
         caveats
     }
 
-    /// δ on the named eigenvectors (counted from 1), 3 numbers each.
-    pub fn on(&self, eigenvectors: &[usize]) -> Vec<f32> {
-        eigenvectors.iter().flat_map(|&j| self.delta[j - 1]).map(|x| x as f32).collect()
+    /// Stored coefficients as a comparison needs them.
+    ///
+    /// # Errors
+    /// [`Error::UnknownField`] if the study does not keep the function.
+    pub fn on(&self, need: &Need) -> Result<Vec<f32>, Error> {
+        let all = self.values(need.function)?;
+        let components = need.function.components();
+        Ok(match &need.eigenvectors {
+            None => all,
+            Some(j) => j.iter().flat_map(|&j| all[components * (j - 1)..components * j].to_vec()).collect(),
+        })
     }
+
+    /// Root mean square of a function over the surface; 0 for fields.
+    pub fn rms(&self, function: Function) -> f64 {
+        match function {
+            Function::Displacement => self.rms,
+            Function::Rotation => self.turn,
+            Function::Field(_) => 0.0,
+        }
+    }
+
+    /// All K coefficients of a function, K × components.
+    ///
+    /// # Errors
+    /// [`Error::UnknownField`] if the study does not keep it.
+    pub fn values(&self, function: Function) -> Result<Vec<f32>, Error> {
+        let narrow = |values: &[Vector]| values.iter().flatten().map(|&x| x as f32).collect();
+        match function {
+            Function::Displacement => Ok(narrow(&self.delta)),
+            Function::Rotation => Ok(narrow(&self.rotation)),
+            Function::Field(asked) => {
+                let found = self.fields.iter().find(|(field, _)| *field == asked);
+                found
+                    .map(|(_, values)| values.clone())
+                    .ok_or_else(|| unknown_field(asked, self.fields.iter().map(|(field, _)| *field)))
+            }
+        }
+    }
+}
+
+/// A field that is not among those that the study keeps.
+pub(crate) fn unknown_field(asked: Field, kept: impl Iterator<Item = Field>) -> Error {
+    let names: Vec<String> = kept.map(|field| field.to_string()).collect();
+    let available = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+    Error::UnknownField { asked: asked.to_string(), available }
 }
 
 impl Named {
@@ -83,18 +151,28 @@ impl Named {
 pub fn resolve(loaded: &Loaded, named: &Named) -> Result<Target, Error> {
     let study = &loaded.study;
     if study.manifest().runs.contains_key(&named.run) {
-        let rows = study.coefficients(None, Rows::Run(&named.run))?;
+        let read = |function| study.coefficients_of(function, None, Rows::Run(&named.run));
+        let (rows, turned) = (read(Function::Displacement)?, read(Function::Rotation)?);
         let state = state_of(named, rows.rows())?;
-        let delta = rows.triples(state);
-        let warnings = study.record(&named.run)?.warnings.clone();
-        return Ok(Target { run: named.run.clone(), state, time: rows.times[state], delta, warnings });
+        let fields = study.settings().fields.iter();
+        let fields = fields.map(|field| Ok((*field, read(Function::Field(*field))?.row(state).to_vec())));
+        return Ok(Target {
+            run: named.run.clone(),
+            state,
+            time: rows.times[state],
+            delta: rows.triples(state),
+            rotation: turned.triples(state),
+            rms: rows.rms[state],
+            turn: turned.rms[state],
+            fields: fields.collect::<Result<_, Error>>()?,
+            warnings: study.record(&named.run)?.warnings.clone(),
+        });
     }
     let run = open_outside(study, &named.run)?;
-    let projected = project(&run, &loaded.reference, &loaded.basis, &())?;
+    let mut projected = project(&run, &loaded.reference, &loaded.basis, &study.settings().fields, &())?;
     let state = state_of(named, projected.states.len())?;
-    let found = &projected.states[state];
-    let delta = triples(&found.delta);
-    Ok(Target { run: projected.run, state, time: found.time, delta, warnings: projected.warnings })
+    let found = projected.states.swap_remove(state);
+    Ok(Target::of_state(projected.run, state, found, projected.warnings))
 }
 
 /// Positions of a target on the mesh, N × 3, read from its result file.
@@ -103,6 +181,15 @@ pub fn resolve(loaded: &Loaded, named: &Named) -> Result<Target, Error> {
 /// [`Error::UnknownRun`]; [`Error::RunChanged`] if the file holds another shape than the coefficients say, so that old
 /// and new are never mixed; reading errors.
 pub fn shape(loaded: &Loaded, named: &Named, target: &Target) -> Result<Vec<[f64; 3]>, Error> {
+    on_surface(loaded, named, target, Function::Displacement)
+}
+
+/// A function of a target on the mesh, N × 3, read from its result file: positions for [`Function::Displacement`], else
+/// the field (a scalar in the first place).
+///
+/// # Errors
+/// As [`shape`], and [`Error::NoField`].
+pub fn on_surface(loaded: &Loaded, named: &Named, target: &Target, function: Function) -> Result<Vec<[f64; 3]>, Error> {
     let Loaded { study, reference, basis, .. } = loaded;
     let run = match study.manifest().runs.get(&named.run) {
         Some(record) => Run::open(&named.run, &record.path)?,
@@ -111,9 +198,10 @@ pub fn shape(loaded: &Loaded, named: &Named, target: &Target) -> Result<Vec<[f64
     if target.state >= run.times().len() {
         return Err(Error::RunChanged { run: target.run.clone() });
     }
-    let shape = reference.shape(&run, &reference.place(&run)?, target.state)?;
-    let displacement: Vec<[f64; 3]> =
-        shape.iter().zip(reference.mesh.vertices()).map(|(p, q)| std::array::from_fn(|c| p[c] - q[c])).collect();
+    let placement = reference.place(&run)?;
+    let shape = reference.shape(&run, &placement, target.state)?;
+    let displacement: Vec<Vector> =
+        shape.iter().zip(reference.mesh.vertices()).map(|(p, q)| subtract(*p, *q)).collect();
     let now = coefficients(basis, &displacement);
     let square = |values: &[[f64; 3]]| values.as_flattened().iter().map(|x| x * x).sum::<f64>();
     let change: f64 = now.as_flattened().iter().zip(target.delta.as_flattened()).map(|(a, b)| (a - b).powi(2)).sum();
@@ -121,7 +209,11 @@ pub fn shape(loaded: &Loaded, named: &Named, target: &Target) -> Result<Vec<[f64
     if change > 1e-12 * square(&now).max(square(&target.delta)) {
         return Err(Error::RunChanged { run: target.run.clone() });
     }
-    Ok(shape)
+    match function {
+        Function::Displacement => Ok(shape),
+        Function::Rotation => Ok(rotation::field(reference.mesh.triangles(), reference.mesh.vertices(), &shape)),
+        Function::Field(field) => reference.field(&run, &placement, field, target.state),
+    }
 }
 
 fn state_of(named: &Named, states: usize) -> Result<usize, Error> {

@@ -40,8 +40,8 @@ fn ask(folder: &Path) -> Result<(), crumple::Error> {
         crumple::reconstruct::reconstruct(
             &loaded.reference,
             &loaded.basis,
-            descriptor.select,
-            &descriptor.eigenvectors,
+            descriptor.selected.select,
+            &descriptor.selected.eigenvectors,
             &target.delta,
         );
     }
@@ -171,7 +171,7 @@ fn a_manifest_edited_by_hand_never_panics() {
             text.replacen("\"part\": \"coefficients/", "\"part\": \"coefficients/x", 1)
         }),
         ("another basis", |text| text.replacen("\"basis\": \"", "\"basis\": \"f", 1)),
-        ("another layout", |text| text.replacen("\"layout\": 1", "\"layout\": 2", 1)),
+        ("another layout", |text| text.replacen("\"layout\": 2", "\"layout\": 3", 1)),
         ("a path that is gone", |text| text.replace("/d3plot\"", "/d4plot\"")),
     ];
     let mut passed_over = Vec::new();
@@ -192,8 +192,9 @@ fn a_descriptor_that_does_not_fit_the_study_is_refused() {
     let made = descriptor::load(&study, "run_1").unwrap();
     let path = world.path("study/descriptors/run_1.json");
     let write = |eigenvectors: Vec<usize>| {
-        let values = vec![[1.0, 2.0, 3.0]; eigenvectors.len()];
-        let descriptor = descriptor::Descriptor { eigenvectors, values, ..made.clone() };
+        let values = vec![vec![1.0, 2.0, 3.0]; eigenvectors.len()];
+        let selected = descriptor::Selected { eigenvectors, values, ..made.selected.clone() };
+        let descriptor = descriptor::Descriptor { selected, ..made.clone() };
         std::fs::write(&path, serde_json_of(&descriptor)).unwrap();
     };
     for eigenvectors in [vec![], vec![0, 1], vec![1, 9], vec![1, usize::MAX], vec![3, 2], vec![2, 2]] {

@@ -26,7 +26,7 @@ fn study(folder: &Path, join: Option<f64>) -> Loaded {
     let found = find(&ids.map(|id| runs().join(id))).unwrap();
     let reference = Run::open("run_001", &found[0].path).unwrap();
     let options = BasisOptions { eigenpairs: 120, join: join.map(crumple::joints::Join::Distance) };
-    let mut study = Study::create(&folder.join("study"), &reference, &[], &options, &()).unwrap();
+    let mut study = Study::create(&folder.join("study"), &reference, &[], &[], &options, &()).unwrap();
     study.add(&found, AddOptions::default(), &()).unwrap();
     Loaded::of(study).unwrap()
 }
@@ -43,7 +43,7 @@ fn the_basis_is_the_one_that_another_program_found() {
     ];
     for (name, join, expected) in [("apart", None, apart), ("joined", Some(2.5), joined)] {
         let options = BasisOptions { eigenpairs: 10, join: join.map(crumple::joints::Join::Distance) };
-        let study = Study::create(&folder.path().join(name), &run, &[], &options, &()).unwrap();
+        let study = Study::create(&folder.path().join(name), &run, &[], &[], &options, &()).unwrap();
         let basis = study.basis().unwrap();
         assert!(basis.facts.complete && relative(basis.facts.area, 138_240.0) < 1e-5);
         for (found, expected) in basis.eigenvalues.iter().zip(expected) {
@@ -86,10 +86,13 @@ fn descriptors_of_real_runs_find_their_runs() {
         for select in [Select::Coordinates, Select::Difference] {
             let made = described(&loaded, run, select, Threshold::default());
             let descriptor = &made.descriptor;
-            assert!(!descriptor.eigenvectors.is_empty() && descriptor.eigenvectors.len() < 40, "{descriptor:?}");
+            assert!(
+                !descriptor.selected.eigenvectors.is_empty() && descriptor.selected.eigenvectors.len() < 40,
+                "{descriptor:?}"
+            );
             // One standard deviation above the mean, over all 3K magnitudes.
-            let kept = |j: usize| made.values[j - 1].iter().any(|x: &f64| x.abs() > descriptor.threshold);
-            assert!((1..=120).all(|j| kept(j) == descriptor.eigenvectors.contains(&j)));
+            let kept = |j: usize| made.values[j - 1].iter().any(|x: &f64| x.abs() > descriptor.selected.threshold);
+            assert!((1..=120).all(|j| kept(j) == descriptor.selected.eigenvectors.contains(&j)));
             for metric in [Metric::Cosine, Metric::Euclidean, Metric::Mahalanobis] {
                 let options = SimilarityOptions { metric, ..Default::default() };
                 let hits = search(&loaded, descriptor, options, Rows::Last).unwrap();
@@ -97,7 +100,7 @@ fn descriptors_of_real_runs_find_their_runs() {
             }
             let displaced: Vec<Point> = made.reconstruction.clone();
             let errors = crumple::reconstruct::errors(&loaded.reference, &loaded.basis, &made.original, &displaced);
-            assert_eq!(errors, descriptor.errors);
+            assert_eq!(Some(errors), descriptor.selected.errors);
             assert!(errors.relative.unwrap() < 1.0, "{run} {select:?}: {errors:?}");
         }
     }

@@ -13,7 +13,8 @@ use tempfile::TempDir;
 /// Two sheets of 1 mm, 1 mm apart: the lower one of 10 mm squares (part 1, nodes from 1), the upper one of 7 mm squares
 /// (part 2, nodes from 1001), so that no node lies above another one but at the corner.
 fn sheets() -> String {
-    let mut text = String::from("*KEYWORD\n*SECTION_SHELL\n1,2\n1.0,1.0,1.0,1.0\n*PART\nlower\n1,1,1\n*PART\nupper\n2,1,1\n");
+    let mut text =
+        String::from("*KEYWORD\n*SECTION_SHELL\n1,2\n1.0,1.0,1.0,1.0\n*PART\nlower\n1,1,1\n*PART\nupper\n2,1,1\n");
     let (mut nodes, mut shells) = (String::from("*NODE\n"), String::from("*ELEMENT_SHELL\n"));
     for (part, first, size, count, z) in [(1, 1, 10.0, 8, 0.0), (2, 1001, 7.0, 11, 1.0)] {
         for j in 0..=count {
@@ -135,14 +136,17 @@ fn beams_and_solids_that_weld_hold_points_inside_faces() {
 fn welds_and_rigid_bodies_hold_their_nodes() {
     let world = World::new();
     // Node 1 lies below 1001; 11 and 13 are neighbours in the lower sheet.
-    let (found, _) = world.joints("*CONSTRAINED_SPOTWELD\n1,1001\n*CONSTRAINED_RIVET\n80,80\n*CONSTRAINED_SPOTWELD\n80,77777\n");
+    let (found, _) =
+        world.joints("*CONSTRAINED_SPOTWELD\n1,1001\n*CONSTRAINED_RIVET\n80,80\n*CONSTRAINED_SPOTWELD\n80,77777\n");
     assert_eq!(found.ties.len(), 1);
     assert_eq!((found.ties[0].node, &found.ties[0].to), (1001, &vec![(1, 1.0)]));
     assert_eq!((found.sources["CONSTRAINED_SPOTWELD"].defined, found.sources["CONSTRAINED_SPOTWELD"].used), (2, 1));
-    let (ring, _) = world.joints("*SET_NODE_LIST\n5\n1,2,1001,1002\n*CONSTRAINED_NODAL_RIGID_BODY\n5\n*CONSTRAINED_NODE_SET\n5,7\n");
+    let (ring, _) = world
+        .joints("*SET_NODE_LIST\n5\n1,2,1001,1002\n*CONSTRAINED_NODAL_RIGID_BODY\n5\n*CONSTRAINED_NODE_SET\n5,7\n");
     let pairs: Vec<(u64, u64)> = ring.ties.iter().map(|tie| (tie.to[0].0, tie.node)).collect();
     assert_eq!(pairs, [(1, 1001), (2, 1002), (1, 1001), (2, 1002)], "neighbours of one sheet stay apart");
-    let rivets = "*NODE\n9001,40.0,40.0,0.5\n*SET_NODE_LIST\n6\n9001\n*CONSTRAINED_INTERPOLATION_SPOTWELD\n1,2,6,2.0,5.0\n";
+    let rivets =
+        "*NODE\n9001,40.0,40.0,0.5\n*SET_NODE_LIST\n6\n9001\n*CONSTRAINED_INTERPOLATION_SPOTWELD\n1,2,6,2.0,5.0\n";
     let (found, reference) = world.joints(rivets);
     straight(&found, &reference);
     assert_eq!(found.ties.len(), 1);
@@ -158,12 +162,16 @@ fn a_study_keeps_what_joined_it_and_check_holds_it_true() {
     let study = Study::create(&world.path("study"), &run, &[], &options(Some(Join::DECK)), &()).unwrap();
     let basis = study.basis().unwrap();
     assert_eq!((basis.facts.null_space, basis.facts.joined_pairs, basis.facts.followers), (1, 3, 2));
-    assert_eq!((study.settings().join, study.reference().unwrap().parts), (Some(Join::DECK), vec!["1 lower".to_owned(), "2 upper".to_owned()]));
+    assert_eq!(
+        (study.settings().join, study.reference().unwrap().parts),
+        (Some(Join::DECK), vec!["1 lower".to_owned(), "2 upper".to_owned()])
+    );
     // Φᵀ M Φ = I in the mass that is stored, with the eigenvectors that are stored (single precision).
     for i in 1..=20 {
         for j in 1..=i {
             let (a, b) = (basis.eigenvector(i), basis.eigenvector(j));
-            let inner: f64 = a.iter().zip(b).zip(&basis.mass).map(|((a, b), m)| f64::from(*a) * f64::from(*b) * m).sum();
+            let inner: f64 =
+                a.iter().zip(b).zip(&basis.mass).map(|((a, b), m)| f64::from(*a) * f64::from(*b) * m).sum();
             assert!((inner - f64::from(u8::from(i == j))).abs() < 1e-6, "{i}, {j}: {inner}");
         }
     }
@@ -208,7 +216,9 @@ fn a_deck_of_another_model_is_refused() {
     let run = world.deck("");
     let other = world.path("other.k");
     std::fs::write(&other, "*NODE\n1,0,0,0\n").unwrap();
-    let with_other = Run::open("model", &world.path("model.k")).unwrap().with_deck(std::sync::Arc::new(crumple::deck::read(&other).unwrap()));
+    let with_other = Run::open("model", &world.path("model.k"))
+        .unwrap()
+        .with_deck(std::sync::Arc::new(crumple::deck::read(&other).unwrap()));
     let error = Study::create(&world.path("study"), &with_other, &[], &options, &()).unwrap_err();
     assert!(matches!(error, Error::OtherDeck { .. }) && error.remedy().is_some(), "{error}");
     assert!(!world.path("study").exists());

@@ -8,6 +8,7 @@ mod world;
 use crumple::descriptor::{DescribeOptions, Select, Threshold, describe};
 use crumple::modes::{By, Method, ModesOptions, load, modes, save};
 use crumple::report::{describe_modes, findings, page};
+use crumple::select::Kind;
 use crumple::similarity::{Metric, SimilarityOptions, Weight, search};
 use crumple::study::{AddOptions, Function, Loaded, Rows, Study, check};
 use crumple::target::Named;
@@ -35,11 +36,13 @@ fn stored_numbers(study: &Study) {
 fn ask_everything(study: Study) {
     let loaded = Loaded::of(study).unwrap();
     let runs: Vec<String> = loaded.study.manifest().runs.keys().cloned().collect();
-    for method in [Method::KMeans, Method::Ward, Method::Average] {
+    for method in Method::ALL {
         for by in [By::Displacement, By::Rotation] {
             let options = ModesOptions { method, by, ..Default::default() };
             let Ok(made) = modes(&loaded.study, &options, &()) else { continue };
-            let numbers = made.runs.iter().flat_map(|run| [run.distance, run.silhouette]);
+            let numbers =
+                made.runs.iter().flat_map(|run| [run.distance, run.silhouette, run.strength, run.score]).flatten();
+            let numbers = numbers.chain(made.tried.iter().flat_map(|tried| [tried.stability, tried.bic]).flatten());
             assert!(numbers.chain(made.modes.iter().map(|mode| mode.spread)).all(f64::is_finite), "{made:?}");
             save(&loaded.study, &made).unwrap();
             assert_eq!(load(&loaded.study).unwrap(), made);
@@ -47,17 +50,21 @@ fn ask_everything(study: Study) {
     }
     for run in &runs {
         for select in [Select::Coordinates, Select::Difference] {
-            let options = DescribeOptions { select, threshold: Threshold::Top(1) };
+            let options = DescribeOptions { select, threshold: Threshold::Top(1), ..Default::default() };
             let made = describe(&loaded, &Named::parse(run), None, None, &options).unwrap().descriptor;
-            let errors = made.rivals.iter().map(|rival| rival.errors).chain([made.errors]);
+            let errors = made.selected.rivals.iter().map(|rival| rival.errors).chain(made.selected.errors);
             for e in errors {
                 assert!(e.rms.is_finite() && e.max.is_finite() && e.relative.is_none_or(f64::is_finite), "{made:?}");
             }
             for metric in [Metric::Cosine, Metric::Euclidean, Metric::Mahalanobis] {
                 for weight in [Weight::None, Weight::Frequency, Weight::Spread] {
-                    let options = SimilarityOptions { centred: weight == Weight::Spread, weight, metric };
-                    let Ok(hits) = search(&loaded, &made, options, Rows::All) else { continue };
-                    assert!(hits.iter().all(|hit| hit.score.similarity.is_finite() && hit.score.distance.is_finite()));
+                    for kind in [Kind::Rotation, Kind::Paper] {
+                        let centred = weight == Weight::Spread;
+                        let options = SimilarityOptions { kind: Some(kind), centred, weight, metric };
+                        let Ok(hits) = search(&loaded, &made, options, Rows::All) else { continue };
+                        let mut scores = hits.iter().flat_map(|hit| [hit.score.similarity, hit.score.distance]);
+                        assert!(scores.all(f64::is_finite));
+                    }
                 }
             }
         }
@@ -119,7 +126,7 @@ proptest! {
             world.write(&format!("run_{number}"), &model.family_of(states));
         }
         let options = crumple::basis::BasisOptions { eigenpairs: 6, join: None };
-        let study = Study::create(&world.path("study"), &world.open("run_0"), &[], &options, &());
+        let study = Study::create(&world.path("study"), &world.open("run_0"), &[], &[], &options, &());
         // A mesh that cannot be used is refused in words.
         if let Ok(mut study) = study {
             let add = AddOptions { skip_bad: true, ..Default::default() };
@@ -200,6 +207,6 @@ fn a_degenerate_face_beside_good_ones_does_not_stop_the_study() {
     let world = World::new();
     world.write("run", &model.family(2, |t, p| p.map(|x| x * (1.0 + t))));
     let options = crumple::basis::BasisOptions { eigenpairs: 6, join: None };
-    let study = Study::create(&world.path("study"), &world.open("run"), &[], &options, &());
+    let study = Study::create(&world.path("study"), &world.open("run"), &[], &[], &options, &());
     assert!(study.is_ok(), "one shell of a thousand stops the study: {}", study.unwrap_err());
 }

@@ -39,7 +39,7 @@ fn projected_with(
     let (reference, basis, run) = (study.reference().unwrap(), study.basis().unwrap(), world.open("run"));
     let placement = reference.place(&run).unwrap();
     let shapes = (0..4).map(|state| reference.shape(&run, &placement, state).unwrap()).collect();
-    let projected = project(&run, &reference, &basis, &()).unwrap();
+    let projected = project(&run, &reference, &basis, &[], &()).unwrap();
     (world, reference, basis, shapes, projected)
 }
 

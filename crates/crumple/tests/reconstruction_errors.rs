@@ -86,7 +86,8 @@ fn errors_fall_as_more_is_kept() {
     for run in ["run_0", "run_4"] {
         let (target, original) = target(&loaded, run);
         for select in [Select::Coordinates, Select::Difference] {
-            let by_rule = |m: usize| described(&loaded, run, select, Threshold::Top(m)).descriptor.errors.rms;
+            let by_rule =
+                |m: usize| described(&loaded, run, select, Threshold::Top(m)).descriptor.selected.errors.unwrap().rms;
             let first = |m: usize| {
                 let kept: Vec<usize> = (1..=m).collect();
                 errors_of(&loaded, select, &kept, &target, &original).rms
@@ -125,12 +126,13 @@ fn the_triples_of_largest_energy_are_the_best_choice_of_m() {
             // The paper's rule on δ; its null space is its own, so that it has at least as many left out as `best`.
             let paper = described(&loaded, run, Select::Difference, Threshold::Top(m)).descriptor;
             let left_out = |rms: f64| (rms * rms - all * all).max(0.0);
-            let kept: Vec<usize> = paper.eigenvectors.iter().copied().filter(|j| !always.contains(j)).collect();
+            let kept: Vec<usize> =
+                paper.selected.eigenvectors.iter().copied().filter(|j| !always.contains(j)).collect();
             let best_of_same_size = left_out(rms(&by_energy[..kept.len()]));
             assert!(
-                left_out(paper.errors.rms) <= 3.0 * best_of_same_size + 1e-3,
+                left_out(paper.selected.errors.unwrap().rms) <= 3.0 * best_of_same_size + 1e-3,
                 "{run}, M = {m}: {} > 3 × {best_of_same_size}",
-                left_out(paper.errors.rms)
+                left_out(paper.selected.errors.unwrap().rms)
             );
         }
     }
@@ -154,10 +156,15 @@ fn the_paper_s_rule_may_lose_to_the_best_choice() {
     world.write("run", &model.family_of([(0.0, nodes)]));
     let loaded = world.study(10);
     let found = described(&loaded, "run", Select::Difference, Threshold::Top(1)).descriptor;
-    assert_eq!(found.eigenvectors, [4]);
+    assert_eq!(found.selected.eigenvectors, [4]);
     let (target, original) = target(&loaded, "run");
     let three = errors_of(&loaded, Select::Difference, &[3], &target, &original);
-    assert!(three.rms < found.errors.rms, "{} against {}", three.rms, found.errors.rms);
+    assert!(
+        three.rms < found.selected.errors.unwrap().rms,
+        "{} against {}",
+        three.rms,
+        found.selected.errors.unwrap().rms
+    );
 }
 
 #[test]
@@ -166,7 +173,7 @@ fn rivals_are_measured_on_the_same_state_with_the_same_size() {
     let (target, original) = target(&loaded, "run_2");
     for select in [Select::Coordinates, Select::Difference] {
         let found = described(&loaded, "run_2", select, Threshold::Top(9));
-        let rival = |name: &str| found.descriptor.rivals.iter().find(|rival| rival.method == name).unwrap();
+        let rival = |name: &str| found.descriptor.selected.rivals.iter().find(|rival| rival.method == name).unwrap();
         let first: Vec<usize> = (1..=9).collect();
         assert_eq!(rival(FIRST_M).errors, errors_of(&loaded, select, &first, &target, &original));
         assert_eq!(rival(FIRST_M).size, 9);

@@ -14,7 +14,7 @@ fn options() -> Vec<SimilarityOptions> {
     for centred in [false, true] {
         for weight in [Weight::None, Weight::Frequency, Weight::Spread] {
             for metric in [Metric::Cosine, Metric::Euclidean, Metric::Mahalanobis] {
-                all.push(SimilarityOptions { centred, weight, metric });
+                all.push(SimilarityOptions { kind: None, centred, weight, metric });
             }
         }
     }
@@ -91,12 +91,12 @@ fn euclidean_distance_is_the_rms_of_the_band_limited_difference() {
     for select in [Select::Coordinates, Select::Difference] {
         let descriptor = described(&loaded, "run_1", select, Threshold::Top(8)).descriptor;
         let options = SimilarityOptions { metric: Metric::Euclidean, ..Default::default() };
-        let rows = loaded.study.coefficients(Some(&descriptor.eigenvectors), Rows::Last).unwrap();
+        let rows = loaded.study.coefficients(Some(&descriptor.selected.eigenvectors), Rows::Last).unwrap();
         let target = rows.runs.iter().position(|run| run == "run_1").unwrap();
-        let band = |row: usize| synthesize(basis, &descriptor.eigenvectors, &triples(rows.row(row)));
+        let band = |row: usize| synthesize(basis, &descriptor.selected.eigenvectors, &triples(rows.row(row)));
         let comparer = Comparer::new(&loaded, &descriptor, options).unwrap();
         for row in 0..rows.rows() {
-            let distance = comparer.score(rows.row(row)).distance;
+            let distance = comparer.score(&[rows.stored(row)]).distance;
             let expected = rms(&basis.mass, &band(row), &band(target));
             // f32 rounding of basis and coefficients, of shapes of some 50 mm.
             assert!((distance - expected).abs() < 1e-5 * (1.0 + expected), "{distance} and {expected}");
@@ -161,14 +161,14 @@ fn another_basis_of_the_same_spaces_gives_the_same_similarities() {
         }
         // Half of the pair is not a thing of the shape: a descriptor that cuts it must say so.
         let cut = described(&loaded, "run_1", select, Threshold::Top(9)).descriptor;
-        assert!(cut.split_clusters.is_empty());
+        assert!(cut.selected.split_clusters.is_empty());
     }
     for m in 1..9 {
         let descriptor = described(&loaded, "run_1", Select::Difference, Threshold::Top(m)).descriptor;
         for &(first, last) in &clusters {
-            let held = (first..=last).filter(|j| descriptor.eigenvectors.contains(j)).count();
+            let held = (first..=last).filter(|j| descriptor.selected.eigenvectors.contains(j)).count();
             let cut = held > 0 && held < last + 1 - first;
-            assert_eq!(descriptor.split_clusters.contains(&(first, last)), cut, "{descriptor:?}");
+            assert_eq!(descriptor.selected.split_clusters.contains(&(first, last)), cut, "{descriptor:?}");
         }
     }
 }

@@ -56,7 +56,7 @@ fn what_is_read_is_what_was_written() {
     world.add(&mut study).unwrap();
     let basis = study.basis().unwrap();
     for run in ["run_0", "run_1", "run_2"] {
-        let projected = crumple::project::project(&world.open(run), &reference, &basis, &()).unwrap();
+        let projected = crumple::project::project(&world.open(run), &reference, &basis, &[], &()).unwrap();
         let rows = study.coefficients(None, Rows::Run(run)).unwrap();
         let deltas: Vec<f32> = projected.states.iter().flat_map(|state| state.delta.clone()).collect();
         assert_eq!(rows.values, deltas);
@@ -316,8 +316,14 @@ fn a_stopped_add_keeps_what_is_finished_even_beside_a_bad_run() {
 fn a_stopped_init_leaves_nothing() {
     let world = bundle(1);
     let options = crumple::basis::BasisOptions { eigenpairs: 6, join: None };
-    let stopped =
-        Study::create(&world.path("study"), &world.open("run_000"), &[], &options, &Stopping(AtomicUsize::new(0), 0));
+    let stopped = Study::create(
+        &world.path("study"),
+        &world.open("run_000"),
+        &[],
+        &[],
+        &options,
+        &Stopping(AtomicUsize::new(0), 0),
+    );
     assert!(matches!(stopped, Err(Error::Stopped)), "{stopped:?}");
     let left: Vec<_> = std::fs::read_dir(world.path("")).unwrap().map(|entry| entry.unwrap().file_name()).collect();
     assert_eq!(left, ["runs"]);

@@ -83,9 +83,9 @@ impl Ids {
 
     fn has(&self, id: u64) -> bool {
         match self {
-            Ids::Bits { first, bits } => id.checked_sub(*first).is_some_and(|at| {
-                bits.get((at / 64) as usize).is_some_and(|word| word >> (at % 64) & 1 == 1)
-            }),
+            Ids::Bits { first, bits } => id
+                .checked_sub(*first)
+                .is_some_and(|at| bits.get((at / 64) as usize).is_some_and(|word| word >> (at % 64) & 1 == 1)),
             Ids::Sorted(sorted) => sorted.binary_search(&id).is_ok(),
         }
     }

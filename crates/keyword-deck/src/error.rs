@@ -44,7 +44,9 @@ pub enum Error {
         path: PathBuf,
     },
     /// No keyword of LS-DYNA is where one must be.
-    #[error("{place}: not a keyword deck: a line that starts with a keyword such as *KEYWORD or *NODE was expected, '{found}' is there")]
+    #[error(
+        "{place}: not a keyword deck: a line that starts with a keyword such as *KEYWORD or *NODE was expected, '{found}' is there"
+    )]
     NotADeck {
         /// Where.
         place: Place,

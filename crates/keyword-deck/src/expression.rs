@@ -203,12 +203,13 @@ fn function(name: &str, arguments: &[Value]) -> Result<Value, String> {
     let round = |value: f64| {
         if value.abs() < 9e15 { Ok(Value::Integer(value as i64)) } else { Err("an overflow".to_owned()) }
     };
-    let extreme = |largest: bool| {
-        let better = |a: f64, b: f64| if largest { a > b } else { a < b };
-        arguments.iter().fold(arguments[0].clone(), |best, next| {
-            if better(real(next), real(&best)) { next.clone() } else { best }
-        })
-    };
+    let extreme =
+        |largest: bool| {
+            let better = |a: f64, b: f64| if largest { a > b } else { a < b };
+            arguments.iter().fold(arguments[0].clone(), |best, next| {
+                if better(real(next), real(&best)) { next.clone() } else { best }
+            })
+        };
     match (name, &numbers[..]) {
         ("ABS", [_]) => match arguments[0] {
             Value::Integer(value) => value.checked_abs().map(Value::Integer).ok_or_else(|| "an overflow".into()),
@@ -282,7 +283,8 @@ mod tests {
     #[test]
     fn what_cannot_be_evaluated_says_why() {
         let deep = "(".repeat(100_000);
-        for text in ["", "1+", "1/0", "u+1", "(1", "1)", "foo(1)", "sqrt(-1)", "9**99", "1e400", &deep, "1.2.3", "sin"] {
+        for text in ["", "1+", "1/0", "u+1", "(1", "1)", "foo(1)", "sqrt(-1)", "9**99", "1e400", &deep, "1.2.3", "sin"]
+        {
             assert!(value(text).is_err(), "{text}");
         }
         assert_eq!(value("u").unwrap_err(), "the parameter 'U' has no definition before this line");

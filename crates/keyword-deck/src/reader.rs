@@ -27,10 +27,40 @@ const JUNK_MAX: u64 = 100;
 
 /// First words of LS-DYNA's keywords: what tells a deck without *KEYWORD from another text.
 const FAMILIES: &[&str] = &[
-    "KEYWORD", "NODE", "ELEMENT", "PART", "SECTION", "MAT", "SET", "DEFINE", "INCLUDE", "PARAMETER", "CONTROL",
-    "DATABASE", "CONTACT", "CONSTRAINED", "BOUNDARY", "LOAD", "INITIAL", "RIGIDWALL", "AIRBAG", "ALE", "EOS",
-    "HOURGLASS", "DAMPING", "DEFORMABLE", "TITLE", "COMMENT", "CASE", "CHANGE", "INTERFACE", "PERTURBATION", "SENSOR",
-    "TERMINATION", "USER", "END",
+    "KEYWORD",
+    "NODE",
+    "ELEMENT",
+    "PART",
+    "SECTION",
+    "MAT",
+    "SET",
+    "DEFINE",
+    "INCLUDE",
+    "PARAMETER",
+    "CONTROL",
+    "DATABASE",
+    "CONTACT",
+    "CONSTRAINED",
+    "BOUNDARY",
+    "LOAD",
+    "INITIAL",
+    "RIGIDWALL",
+    "AIRBAG",
+    "ALE",
+    "EOS",
+    "HOURGLASS",
+    "DAMPING",
+    "DEFORMABLE",
+    "TITLE",
+    "COMMENT",
+    "CASE",
+    "CHANGE",
+    "INTERFACE",
+    "PERTURBATION",
+    "SENSOR",
+    "TERMINATION",
+    "USER",
+    "END",
 ];
 
 /// Reads the deck whose main file is at `root`.
@@ -158,7 +188,9 @@ impl Reader<'_> {
                     let line = line.to_ascii_uppercase();
                     self.end(&mut block, file, frame)?;
                     if let Some((first, _, count)) = junk.take() {
-                        self.deck.warnings.push(Warning::BeforeFirstKeyword { place: place(file, first), lines: count });
+                        self.deck
+                            .warnings
+                            .push(Warning::BeforeFirstKeyword { place: place(file, first), lines: count });
                     }
                     if keyword == "END" {
                         return Ok(());
@@ -293,7 +325,11 @@ impl Reader<'_> {
             // The mesh does not hang on these blocks: each costs itself and a warning.
             Err(error) => {
                 let what = error.to_string();
-                self.deck.warnings.push(Warning::BadCard { place: place(file, block.line), keyword: keyword.to_owned(), what });
+                self.deck.warnings.push(Warning::BadCard {
+                    place: place(file, block.line),
+                    keyword: keyword.to_owned(),
+                    what,
+                });
             }
         }
         include.map_or(Ok(()), |include| self.include(include, block, file, frame))

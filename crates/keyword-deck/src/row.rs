@@ -27,7 +27,8 @@ impl Format {
         if self != Format::Guess {
             return self;
         }
-        let long = text.trim_ascii_end().len() > 80 || text.get(..10).is_some_and(|first| first.trim_ascii().is_empty());
+        let long =
+            text.trim_ascii_end().len() > 80 || text.get(..10).is_some_and(|first| first.trim_ascii().is_empty());
         if long { Format::Long } else { Format::Standard }
     }
 
@@ -232,8 +233,11 @@ impl<'a> Row<'a> {
             _ => return Ok(None),
         };
         let name: Cow<'_, str> = String::from_utf8_lossy(name.trim_ascii());
-        let missing =
-            || Error::Parameter { place: self.place(), keyword: self.at.keyword.to_owned(), name: short(name.as_bytes()) };
+        let missing = || Error::Parameter {
+            place: self.place(),
+            keyword: self.at.keyword.to_owned(),
+            name: short(name.as_bytes()),
+        };
         let value = self.at.parameters.get(&name).ok_or_else(missing)?;
         Ok(Some(match value {
             Value::Integer(value) if negative => Value::Integer(value.saturating_neg()),

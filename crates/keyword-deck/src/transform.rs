@@ -57,9 +57,14 @@ pub(crate) fn affine(steps: &[Step], nodes: &dyn Fn(u64) -> Option<Point>) -> Re
     for step in steps {
         let a = &step.a;
         let point = |value: f64| {
-            points.get(&(value as i64)).copied().ok_or_else(|| format!("{} names POINT {value}, which is not defined before", step.option))
+            points
+                .get(&(value as i64))
+                .copied()
+                .ok_or_else(|| format!("{} names POINT {value}, which is not defined before", step.option))
         };
-        let node = |value: f64| nodes(value as u64).ok_or_else(|| format!("{} names node {value}, which is not there", step.option));
+        let node = |value: f64| {
+            nodes(value as u64).ok_or_else(|| format!("{} names node {value}, which is not there", step.option))
+        };
         let next = match step.option.as_str() {
             "POINT" => {
                 points.insert(a[0] as i64, [a[1], a[2], a[3]]);
@@ -80,12 +85,13 @@ pub(crate) fn affine(steps: &[Step], nodes: &dyn Fn(u64) -> Option<Point>) -> Re
             "MIRROR" => {
                 let from = [a[0], a[1], a[2]];
                 let normal = unit(sub([a[3], a[4], a[5]], from)).ok_or("MIRROR with a plane without a normal")?;
-                let reflect = std::array::from_fn(|i| {
-                    std::array::from_fn(|j| f64::from(i == j) - 2.0 * normal[i] * normal[j])
-                });
+                let reflect =
+                    std::array::from_fn(|i| std::array::from_fn(|j| f64::from(i == j) - 2.0 * normal[i] * normal[j]));
                 Affine::about(reflect, from)
             }
-            "POS6P" => position([point(a[0])?, point(a[1])?, point(a[2])?], [point(a[3])?, point(a[4])?, point(a[5])?])?,
+            "POS6P" => {
+                position([point(a[0])?, point(a[1])?, point(a[2])?], [point(a[3])?, point(a[4])?, point(a[5])?])?
+            }
             "POS6N" => position([node(a[0])?, node(a[1])?, node(a[2])?], [node(a[3])?, node(a[4])?, node(a[5])?])?,
             "TRANSL2ND" => {
                 let direction = unit(sub(node(a[1])?, node(a[0])?)).ok_or("TRANSL2ND of two nodes at one place")?;
@@ -175,7 +181,11 @@ mod tests {
         let placed = map(&cards);
         assert!(close(placed.apply([1.0, 0.0, 0.0]), [5.0, 6.0, 5.0]));
         assert!(close(placed.apply([0.0, 0.0, 1.0]), [6.0, 5.0, 5.0]));
-        let turn = map(&[point(1.0, [1.0, 0.0, 0.0]), point(2.0, [1.0, 0.0, 9.0]), ("ROTATE", [1.0, 2.0, 180.0, 0.0, 0.0, 0.0, 0.0])]);
+        let turn = map(&[
+            point(1.0, [1.0, 0.0, 0.0]),
+            point(2.0, [1.0, 0.0, 9.0]),
+            ("ROTATE", [1.0, 2.0, 180.0, 0.0, 0.0, 0.0, 0.0]),
+        ]);
         assert!(close(turn.apply([3.0, 0.0, 0.0]), [-1.0, 0.0, 0.0]));
     }
 

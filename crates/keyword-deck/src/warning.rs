@@ -127,7 +127,9 @@ impl fmt::Display for Warning {
                 write!(f, "{place}: {lines} lines in front of the first keyword were left out")
             }
             Self::BadCard { place, keyword, what } => write!(f, "{place}: *{keyword} was left out: {what}"),
-            Self::Twice { what, id, count: 1 } => write!(f, "{what} {id} is defined twice; the first definition counts"),
+            Self::Twice { what, id, count: 1 } => {
+                write!(f, "{what} {id} is defined twice; the first definition counts")
+            }
             Self::Twice { what, id, count } => {
                 write!(f, "{count} {what} ids are defined twice, {id} first; the first definition counts")
             }

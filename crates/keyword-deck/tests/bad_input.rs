@@ -56,9 +56,16 @@ fn cards_of_the_mesh_that_are_wrong_are_named() {
     );
     assert!(words(b"*NODE\n       1,1e999,0,0\n").contains("'1e999' is there"));
     assert!(words(b"*NODE\n      -1             1.0             0.0             0.0\n").contains("from 0"));
-    assert!(words(b"*ELEMENT_SHELL\n       1       1       1       2    here       4\n").contains("a.k:2: *ELEMENT_SHELL, N:"));
-    assert!(words(b"*ELEMENT_SOLID\n       1       1\n*END\n").contains("the card with the solid's nodes was expected"));
-    assert!(words(b"*ELEMENT_SHELL_THICKNESS\n       1       1       1       2       3       4\n").contains("thicknesses"));
+    assert!(
+        words(b"*ELEMENT_SHELL\n       1       1       1       2    here       4\n")
+            .contains("a.k:2: *ELEMENT_SHELL, N:")
+    );
+    assert!(
+        words(b"*ELEMENT_SOLID\n       1       1\n*END\n").contains("the card with the solid's nodes was expected")
+    );
+    assert!(
+        words(b"*ELEMENT_SHELL_THICKNESS\n       1       1       1       2       3       4\n").contains("thicknesses")
+    );
     let missing = read(b"*ELEMENT_SHELL\n       5       1       1       2       3       4\n").unwrap();
     assert_eq!(missing.warnings[0].kind(), "nodes-missing");
     let twice = read(b"*NODE\n       1             1.0             0.0             0.0\n       1             2.0             0.0             0.0\n").unwrap();

@@ -44,9 +44,11 @@ fn every_width_reads_the_same_mesh() {
         let mut text = format!("{head}\n*PART{}\nlid\n", suffix.replace('%', ""));
         text += &line(&[if narrow == 20 { 20 } else { 10 }; 3], &["7", "1", "1"]);
         text += &format!("*NODE{suffix}\n");
-        for (id, [x, y, z]) in
-            [("10000001", ["-1.0", "0.0", "5.0"]), ("10000002", ["1.", "0", "5.0"]), ("10000003", ["0", "1.0D0", "+5."])]
-        {
+        for (id, [x, y, z]) in [
+            ("10000001", ["-1.0", "0.0", "5.0"]),
+            ("10000002", ["1.", "0", "5.0"]),
+            ("10000003", ["0", "1.0D0", "+5."]),
+        ] {
             text += &line(&[narrow, wide, wide, wide], &[id, x, y, z]);
         }
         text += &format!("*ELEMENT_SHELL{suffix}\n");
@@ -58,7 +60,11 @@ fn every_width_reads_the_same_mesh() {
     assert_eq!(expected.shells[0].nodes, [10000001, 10000002, 10000003, 10000003]);
     assert_eq!(expected.part_table()[0].elements.shells, 1);
     let same = |deck: Deck, what: &str| {
-        assert_eq!((deck.coordinates, deck.shells, deck.parts[0].id), (expected.coordinates.clone(), expected.shells.clone(), 7), "{what}");
+        assert_eq!(
+            (deck.coordinates, deck.shells, deck.parts[0].id),
+            (expected.coordinates.clone(), expected.shells.clone(), 7),
+            "{what}"
+        );
     };
     same(deck("*KEYWORD I10=Y", "", 10, 16, false), "I10=Y");
     same(deck("*KEYWORD", "%", 10, 16, false), "%");
@@ -169,7 +175,11 @@ fn solids_thick_shells_and_beams() {
         }
         let deck = read(&text);
         assert_eq!(deck.solids.len(), 2, "{options} {node_cards:?}");
-        assert!(deck.solids.iter().all(|solid| solid.nodes == corners && solid.part == 3), "{options}: {:?}", deck.solids);
+        assert!(
+            deck.solids.iter().all(|solid| solid.nodes == corners && solid.part == 3),
+            "{options}: {:?}",
+            deck.solids
+        );
     }
     let row = eights(&["1", "3", "1", "2", "3", "4", "5", "6", "7", "8"]);
     let beta = card(&[16; 5], &["", "", "", "", "30.0"]);
@@ -178,13 +188,15 @@ fn solids_thick_shells_and_beams() {
     let plies = tens(&["5", "0.25", "0.0", "", "6", "0.5", "90.0"]);
     assert_eq!(read(&format!("*ELEMENT_TSHELL_COMPOSITE\n{row}{plies}{plies}{row}{plies}")).thick_shells.len(), 2);
     let beam = eights(&["1", "3", "1", "2", "3"]);
-    for options in ["THICKNESS", "SCALAR", "SECTION", "PID", "OFFSET", "ORIENTATION", "WARPAGE", "ELBOW", "PID_OFFSET"] {
+    for options in ["THICKNESS", "SCALAR", "SECTION", "PID", "OFFSET", "ORIENTATION", "WARPAGE", "ELBOW", "PID_OFFSET"]
+    {
         let extra = tens(&["1", "2"]).repeat(options.split('_').count());
         let deck = read(&format!("*ELEMENT_BEAM_{options}\n{beam}{extra}{beam}{extra}"));
         assert_eq!(deck.beams.len(), 2, "{options}");
         assert_eq!(deck.beams[1].nodes, [1, 2], "{options}");
     }
-    let counted = read("*ELEMENT_MASS\n       1       1             0.5\n*ELEMENT_SPH\n       1       1\n       2       1\n");
+    let counted =
+        read("*ELEMENT_MASS\n       1       1             0.5\n*ELEMENT_SPH\n       1       1\n       2       1\n");
     assert_eq!((counted.other_elements["MASS"], counted.other_elements["SPH"]), (1, 2));
 }
 
@@ -249,7 +261,10 @@ fn sections_and_materials() {
     assert_eq!(found, [(1, "roof", 16), (2, "floor", 2), (3, "", 9), (4, "", 1), (5, "", 20)]);
     assert_eq!(deck.sections[1].thickness, Some([0.8; 4]));
     let resolver = Resolver::new(&deck);
-    assert_eq!((resolver.material(1), resolver.formulation(1), resolver.part_thickness(1)), (Some("MAT_SPOTWELD"), 9, Some(6.0)));
+    assert_eq!(
+        (resolver.material(1), resolver.formulation(1), resolver.part_thickness(1)),
+        (Some("MAT_SPOTWELD"), 9, Some(6.0))
+    );
 }
 
 #[test]
@@ -267,7 +282,11 @@ fn sets_of_every_form() {
     text += &("*SET_NODE_COLUMN\n".to_owned() + &tens(&["4"]) + &tens(&["29"]) + &tens(&["28"]));
     text += &("*SET_NODE_ADD\n".to_owned() + &tens(&["5"]) + &tens(&["1", "4"]));
     text += &("*SET_NODE_INTERSECT\n".to_owned() + &tens(&["6"]) + &tens(&["1", "3"]));
-    text += &("*SET_NODE_GENERAL\n".to_owned() + &tens(&["7"]) + &tens(&["PART", "8"]) + &tens(&["DNODE", "5"]) + &tens(&["NODE", "30"]));
+    text += &("*SET_NODE_GENERAL\n".to_owned()
+        + &tens(&["7"])
+        + &tens(&["PART", "8"])
+        + &tens(&["DNODE", "5"])
+        + &tens(&["NODE", "30"]));
     text += &("*SET_NODE_ADD\n".to_owned() + &tens(&["8"]) + &tens(&["8", "1"]));
     text += &("*SET_SEGMENT\n".to_owned() + &tens(&["1"]) + &tens(&["1", "2", "3", "4"]) + &tens(&["5", "6", "7"]));
     text += &("*SET_PART_LIST_GENERATE\n".to_owned() + &tens(&["1"]) + &tens(&["1", "7"]));
@@ -367,7 +386,10 @@ fn welds_and_ties() {
         ]
     );
     assert_eq!(deck.ties.len(), 3);
-    assert_eq!((deck.ties[0].id, deck.ties[0].title.as_str(), deck.ties[0].thickness), (12, "rim to lid", [-1.5, -2.5]));
+    assert_eq!(
+        (deck.ties[0].id, deck.ties[0].title.as_str(), deck.ties[0].thickness),
+        (12, "rim to lid", [-1.5, -2.5])
+    );
     let surface = |kind, id| Surface { kind, id };
     assert_eq!(deck.ties[0].surfaces, [surface(SurfaceKind::Nodes, 1), surface(SurfaceKind::Part, 2)]);
     assert_eq!(deck.ties[1].surfaces, [surface(SurfaceKind::Part, 3), surface(SurfaceKind::Parts, 4)]);
@@ -392,9 +414,12 @@ fn parameters_and_expressions() {
     assert_eq!(deck.coordinates, [[2.0, -2.0, 8.0], [1.0, 9.0, 3.0]]);
     assert_eq!(deck.parameters, 5);
     // A definition that cannot be read costs a warning; a name that is then missing where the mesh needs it is an error.
-    let broken = read("*PARAMETER\nX a             1.0\n*NODE\n       1             1.0             0.0             0.0\n");
+    let broken =
+        read("*PARAMETER\nX a             1.0\n*NODE\n       1             1.0             0.0             0.0\n");
     assert_eq!(broken.warnings[0].kind(), "bad-card");
-    let missing = try_bytes(b"*PARAMETER_EXPRESSION\nR a       foo(1)\n*NODE\n       1              &a             0.0             0.0\n");
+    let missing = try_bytes(
+        b"*PARAMETER_EXPRESSION\nR a       foo(1)\n*NODE\n       1              &a             0.0             0.0\n",
+    );
     assert!(missing.unwrap_err().to_string().contains("a.k:4: *NODE: the parameter '&a' has no definition"));
 }
 
@@ -413,7 +438,8 @@ fn includes_are_found_moved_and_named() {
         + &tens(&["TRANSL", "0.0", "0.0", "1.0"])
         + &transform("placed.k", "5")
         + "*INCLUDE\nnowhere.k\n*END\n";
-    let placed = "*NODE\n       1             1.0             0.0             0.0\n*ELEMENT_SHELL_THICKNESS\n".to_owned()
+    let placed = "*NODE\n       1             1.0             0.0             0.0\n*ELEMENT_SHELL_THICKNESS\n"
+        .to_owned()
         + &eights(&["1", "7", "1", "1", "1", "0"])
         + &card(&[16; 4], &["0.1", "0.1", "0.1", "0.1"])
         + "*PART\ndoor\n"
@@ -438,7 +464,11 @@ fn includes_are_found_moved_and_named() {
     assert_eq!(deck.node_ids, [2, 3, 4, 5, 101, 201]);
     // 1 mm becomes 10 and rises by 1; the inner node is first scaled and turned, then scaled and raised.
     let close = |a: [f64; 3], b: [f64; 3]| (0..3).all(|c| (a[c] - b[c]).abs() < 1e-12);
-    assert!(close(deck.coordinates[4], [10.0, 0.0, 1.0]) && close(deck.coordinates[5], [0.0, 100.0, 1.0]), "{:?}", deck.coordinates);
+    assert!(
+        close(deck.coordinates[4], [10.0, 0.0, 1.0]) && close(deck.coordinates[5], [0.0, 100.0, 1.0]),
+        "{:?}",
+        deck.coordinates
+    );
     assert_eq!((deck.shells[0].id, deck.shells[0].part, deck.shells[0].nodes[0]), (201, 307, 101));
     assert_eq!(deck.shell_cards[0].thickness, Some([1.0; 4]));
     assert_eq!((deck.parts[0].id, deck.parts[0].section, deck.parts[0].material), (307, 602, 403));
@@ -453,7 +483,9 @@ fn includes_are_found_moved_and_named() {
 #[test]
 fn the_same_file_twice_is_two_copies() {
     let main = "*KEYWORD\n".to_owned()
-        + &["0", "10"].map(|offset| format!("*INCLUDE_TRANSFORM\nwheel.k\n{}", tens(&[offset, offset, offset]))).concat();
+        + &["0", "10"]
+            .map(|offset| format!("*INCLUDE_TRANSFORM\nwheel.k\n{}", tens(&[offset, offset, offset])))
+            .concat();
     let wheel = "*NODE\n       1             1.0             0.0             0.0\n";
     let deck = Deck::read_from(&files(&[("main.k", &main), ("wheel.k", wheel)]), Path::new("main.k")).unwrap();
     assert_eq!(deck.node_ids, [1, 11]);
@@ -465,5 +497,8 @@ fn a_transformation_that_is_not_there_is_said() {
     let wheel = "*NODE\n       1             1.0             0.0             0.0\n";
     let deck = Deck::read_from(&files(&[("main.k", &main), ("wheel.k", wheel)]), Path::new("main.k")).unwrap();
     assert_eq!(deck.coordinates, [[1.0, 0.0, 0.0]]);
-    assert_eq!(deck.warnings[0].to_string(), "main.k:2: the transformation 3 is not defined; the nodes of this include stay where its file has them");
+    assert_eq!(
+        deck.warnings[0].to_string(),
+        "main.k:2: the transformation 3 is not defined; the nodes of this include stay where its file has them"
+    );
 }

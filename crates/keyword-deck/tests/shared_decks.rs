@@ -65,10 +65,16 @@ fn every_deck_counts_as_it_was_counted() {
         // Every keyword of the deck is read, or skipped and counted.
         let keywords = expected["keywords"].as_object().unwrap();
         for (keyword, skipped) in &deck.skipped {
-            assert_eq!(keywords.get(keyword).and_then(serde_json::Value::as_u64), Some(skipped.blocks), "{name}: {keyword}");
+            assert_eq!(
+                keywords.get(keyword).and_then(serde_json::Value::as_u64),
+                Some(skipped.blocks),
+                "{name}: {keyword}"
+            );
         }
         println!("{name}: {} warnings, skipped {:?}", deck.warnings.len(), deck.skipped.keys());
-        for warning in &deck.warnings { println!("   {warning}"); }
+        for warning in &deck.warnings {
+            println!("   {warning}");
+        }
         seen += 1;
     }
     assert!(seen >= 15);

@@ -189,8 +189,10 @@ impl Reduction {
                 }
             }
             difference.sort_by_key(|&(dof, _)| dof); // stable
-            let d: Weights =
-                difference.chunk_by(|a, b| a.0 == b.0).map(|same| (same[0].0, same.iter().map(|d| d.1).sum())).collect();
+            let d: Weights = difference
+                .chunk_by(|a, b| a.0 == b.0)
+                .map(|same| (same[0].0, same.iter().map(|d| d.1).sum()))
+                .collect();
             for (at, &(a, da)) in d.iter().enumerate() {
                 reduced.extend(d[at + 1..].iter().map(|&(b, db)| (a, b, -w * da * db)).filter(|edge| edge.2 != 0.0));
             }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use crumple::bundle;
+use crumple::project::Spent;
 use crumple::study::{AddOptions, Added, Study};
 use crumple::{Error, Watch};
 use serde_json::{Value, json};
@@ -37,23 +38,45 @@ impl Add {
         tell(&study, &added, output);
         output.print(&facts(&study, &added), || {
             format!(
-                "{} added, {} replaced, {} unchanged, {} left out; {} runs in the study",
+                "{} added, {} replaced, {} unchanged, {} left out; {} runs in the study{}",
                 added.added.len(),
                 added.replaced.len(),
                 added.unchanged.len(),
                 added.skipped.len(),
-                study.manifest().runs.len()
+                study.manifest().runs.len(),
+                spent_words(&added.spent)
             )
         });
         Ok(Answer::Done)
     }
 }
 
+/// Where the time of all threads went.
+fn spent_words(spent: &Spent) -> String {
+    if *spent == Spent::default() {
+        return String::new();
+    }
+    let parts = [
+        ("reading", spent.reading),
+        ("displacements", spent.displacement),
+        ("rotations", spent.rotation),
+        ("fields", spent.fields),
+    ];
+    let seconds = parts.iter().filter(|(_, time)| !time.is_zero());
+    let seconds: Vec<String> = seconds.map(|(name, time)| format!("{name} {:.2} s", time.as_secs_f64())).collect();
+    format!("\ntime of all threads: {}", seconds.join(", "))
+}
+
 /// What `add` tells a script.
 pub(crate) fn facts(study: &Study, added: &Added) -> Value {
     let skipped: Vec<Value> =
         added.skipped.iter().map(|(run, reason)| json!({ "run": run, "reason": reason })).collect();
+    let spent = added.spent;
     json!({
+        "seconds": {
+            "reading": spent.reading.as_secs_f64(), "displacement": spent.displacement.as_secs_f64(),
+            "rotation": spent.rotation.as_secs_f64(), "fields": spent.fields.as_secs_f64(),
+        },
         "added": added.added, "replaced": added.replaced, "unchanged": added.unchanged, "skipped": skipped, "notes": added.notes,
         "runs": study.manifest().runs.len(), "warnings": warnings(study, added).into_iter().map(|(run, warning)| json!({ "run": run, "warning": warning })).collect::<Vec<_>>(),
     })

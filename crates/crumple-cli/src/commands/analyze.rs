@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use clap::Args;
 use crumple::bundle::{self, Found};
-use crumple::descriptor::{self, Descriptor};
+use crumple::descriptor::{self, Descriptor, Set};
 use crumple::modes;
 use crumple::reference::Reference;
 use crumple::report::{describe_modes, early_words, findings, page};
@@ -16,7 +16,7 @@ use serde_json::json;
 
 use super::{Answer, add, describe, init};
 use crate::options::{AddArgs, BasisArgs, DescribeArgs, ModesArgs};
-use crate::output::{Output, percent, table};
+use crate::output::{Output, percent, table, two};
 
 #[derive(Args)]
 #[command(
@@ -46,7 +46,7 @@ pub(crate) struct Analyze {
 impl Analyze {
     pub(crate) fn run(&self, output: &Output, watch: &dyn Watch) -> Result<Answer, Error> {
         self.basis.options()?;
-        let (modes_options, describe_options) = (self.modes.options()?, self.describe.options()?);
+        let (modes_options, describe_options) = (self.modes.options()?, self.describe.options(Set::default())?);
         let table = self.add.table()?;
         let mut seconds = Stopwatch::start();
         let found = bundle::find(&self.runs)?;
@@ -80,6 +80,7 @@ impl Analyze {
         seconds.lap("report");
         init::advise(&loaded, output)?;
         early_words(&loaded.study).iter().for_each(|words| output.note(words));
+        modes.notes.iter().for_each(|words| output.note(words));
         let facts = json!({
             "study": self.output,
             "report": path,
@@ -93,7 +94,7 @@ impl Analyze {
             let unit = &loaded.study.settings().length_unit;
             format!(
                 "{}\n\n{}\n\nreport: {}",
-                super::modes::words(&modes, unit),
+                super::modes::words(&modes, loaded.study.settings()),
                 descriptor_words(&descriptors, unit),
                 path.display()
             )
@@ -125,22 +126,22 @@ impl Analyze {
     }
 
     fn open_or_create(&self, reference: &Run, runs: usize, watch: &dyn Watch) -> Result<Study, Error> {
-        let options = self.basis.options()?;
+        let (options, fields) = (self.basis.options()?, self.basis.fields()?);
         if runs < modes::RUNS_MIN && !self.output.exists() {
             // Found out before the eigenbasis is computed, but after what else is wrong with the one run.
             Reference::of_run(reference, &self.basis.parts)?;
             return Err(Error::TooFewRuns { what: "grouping into modes", needed: modes::RUNS_MIN, have: runs });
         }
-        match Study::create(&self.output, reference, &self.basis.parts, &options, watch) {
+        match Study::create(&self.output, reference, &self.basis.parts, &fields, &options, watch) {
             Err(Error::StudyExists { folder, what }) => {
                 let study = match Study::open(&folder) {
                     Err(Error::NotAStudy { .. }) => return Err(Error::StudyExists { folder, what }),
                     other => other?,
                 };
-                if study.is_for(reference, &self.basis.parts, &options)? {
+                if study.is_for(reference, &self.basis.parts, &fields, &options)? {
                     return Ok(study);
                 }
-                let what = "the study here has another mesh, other parts, another join or another number of eigenpairs"
+                let what = "the study here has another mesh, other parts or fields, another join or another number of eigenpairs"
                     .to_owned();
                 Err(Error::StudyExists { folder, what })
             }
@@ -171,14 +172,14 @@ fn first_usable(found: &[Found], skip_bad: bool) -> Result<Run, Error> {
 
 fn descriptor_words(descriptors: &[Descriptor], unit: &str) -> String {
     let rows = descriptors.iter().map(|descriptor| {
-        let errors = &descriptor.errors;
+        let errors = descriptor.selected.errors;
         vec![
             descriptor.name.clone(),
             descriptor.run.clone(),
-            descriptor.eigenvectors.len().to_string(),
-            (3 * descriptor.eigenvectors.len()).to_string(),
-            format!("{:.2}", errors.rms),
-            percent(errors.relative),
+            descriptor.size().to_string(),
+            descriptor.numbers().to_string(),
+            two(errors.map(|errors| errors.rms)),
+            percent(errors.and_then(|errors| errors.relative)),
         ]
     });
     table(&["descriptor", "of", "#eigenvectors", "#numbers", &format!("#RMS error, {unit}"), "#of displacement"], rows)

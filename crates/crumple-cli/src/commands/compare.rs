@@ -47,8 +47,8 @@ fn words(comparison: &Comparison, unit: &str) -> String {
             row.select.to_owned(),
             row.method.clone(),
             row.size.to_string(),
-            format!("{:.2}", row.rms),
-            format!("{:.1}", row.max),
+            two(row.rms),
+            row.max.map_or_else(|| "–".into(), |max| format!("{max:.1}")),
             percent(row.relative),
             two(row.precision_at_9),
             row.average_precision.map_or_else(|| "–".into(), |ap| format!("{ap:.3}")),
@@ -67,13 +67,15 @@ fn words(comparison: &Comparison, unit: &str) -> String {
                 method,
                 modes.count.to_string(),
                 if modes.chosen { "chosen" } else { "given" }.into(),
+                modes.without.to_string(),
                 format!("{:.2}", modes.silhouette),
                 format!("{:.2}", modes.ari),
                 format!("{:.2}", modes.ari_all),
             ]
         });
         text += "\n\nmodes found without labels, against them (adjusted Rand index)\n";
-        text += &table(&["by", "method", "#modes", "number", "#silhouette", "#ARI", "#ARI, all labels"], rows);
+        text +=
+            &table(&["by", "method", "#modes", "number", "#no mode", "#silhouette", "#ARI", "#ARI, all labels"], rows);
     }
     text
 }

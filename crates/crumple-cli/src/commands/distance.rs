@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 use crumple::Error;
-use crumple::descriptor;
 use crumple::similarity::Comparer;
 use crumple::study::Loaded;
 use crumple::target::{Named, resolve};
@@ -21,7 +20,7 @@ use crate::output::Output;
 pub(crate) struct Distance {
     /// Folder of the study
     study: PathBuf,
-    /// Name of a descriptor of the study, or the path of its file
+    /// What to compare with: a descriptor of the study by name, the path of its file, a mode, or a run
     descriptor: String,
     /// Run: an id of the study, or the path of a new result file, which is not added; @N for a state
     #[arg(value_name = "RUN[@STATE]")]
@@ -34,13 +33,13 @@ impl Distance {
     pub(crate) fn run(&self, output: &Output) -> Result<Answer, Error> {
         let options = self.similarity.options()?;
         let loaded = Loaded::open(&self.study)?;
-        let descriptor = descriptor::load(&loaded.study, &self.descriptor)?;
+        let descriptor = self.similarity.descriptor(&loaded, &self.descriptor)?;
         let comparer = Comparer::new(&loaded, &descriptor, options)?;
         let target = resolve(&loaded, &Named::in_study(&loaded.study, &self.run))?;
-        let score = comparer.score(&target.on(comparer.eigenvectors()));
+        let score = comparer.score_target(&target)?;
         let warnings = target.caveats(descriptor.time);
         warnings.iter().for_each(|warning| output.note(&format!("{}: {warning}", target.run)));
-        let facts = json!({ "descriptor": descriptor.name, "run": target.run, "state": target.state, "time": target.time, "distance": score.distance, "similarity": score.similarity, "warnings": warnings });
+        let facts = json!({ "descriptor": descriptor.name, "kind": options.kind.unwrap_or(descriptor.kind), "run": target.run, "state": target.state, "time": target.time, "distance": score.distance, "similarity": score.similarity, "warnings": warnings });
         output.print(&facts, || score.distance.to_string());
         Ok(Answer::Done)
     }

@@ -38,9 +38,9 @@ impl Init {
                 expected: format!("one run; this folder holds {}", found.len()),
             });
         };
-        let options = self.basis.options()?;
+        let (options, fields) = (self.basis.options()?, self.basis.fields()?);
         let run = self.basis.with_deck(Run::open(&only.id, &only.path)?, None)?;
-        let study = Study::create(&self.study, &run, &self.basis.parts, &options, watch)?;
+        let study = Study::create(&self.study, &run, &self.basis.parts, &fields, &options, watch)?;
         let loaded = Loaded::of(study)?;
         let facts = facts(&loaded)?;
         output.print(&facts, || words(&loaded));
@@ -118,7 +118,8 @@ pub(crate) fn advise(loaded: &Loaded, output: &Output) -> Result<(), Error> {
         }
         joints.notes.iter().for_each(|note| output.note(note));
         if joints.ties.is_empty() {
-            output.note("the deck has no weld, rigid body or tied contact that holds the surface; the pieces stay apart");
+            output
+                .note("the deck has no weld, rigid body or tied contact that holds the surface; the pieces stay apart");
         }
     }
     if basis.eigenpairs() < facts.asked {

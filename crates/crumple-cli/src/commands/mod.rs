@@ -3,6 +3,7 @@
 mod add;
 mod analyze;
 mod check;
+mod classify;
 mod compare;
 mod describe;
 mod distance;
@@ -47,6 +48,8 @@ pub(crate) enum Command {
     Search(search::Search),
     /// Does each run deform as the descriptor says? Exit code 1 if one does not
     Verify(verify::Verify),
+    /// Which mode each run belongs to, with a margin, or none. Exit code 1 if one has none
+    Classify(classify::Classify),
     /// One number for an optimiser: how far a run is from a descriptor
     Distance(distance::Distance),
     /// The shape from a descriptor, from the first M eigenvectors or from principal components, as a file
@@ -72,6 +75,7 @@ impl Command {
             Self::Describe(command) => command.run(output),
             Self::Search(command) => command.run(output),
             Self::Verify(command) => command.run(output),
+            Self::Classify(command) => command.run(output),
             Self::Distance(command) => command.run(output),
             Self::Reconstruct(command) => command.run(output),
             Self::Export(command) => command.run(output),

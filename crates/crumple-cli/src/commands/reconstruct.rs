@@ -65,8 +65,15 @@ impl Reconstruct {
         let Loaded { reference, basis, study, .. } = loaded;
         if let Some(name) = &self.descriptor {
             let descriptor = descriptor::load(study, name)?;
-            let shape = reconstruct(reference, basis, descriptor.select, &descriptor.eigenvectors, delta);
-            return Ok((format!("descriptor '{name}'"), descriptor.eigenvectors.len(), shape));
+            let Some(selected) = descriptor.blocks().find(|selected| selected.field.is_none()) else {
+                return Err(Error::Value {
+                    name: "--descriptor",
+                    value: name.clone(),
+                    expected: "a descriptor of the shape; this one is of a field".into(),
+                });
+            };
+            let shape = reconstruct(reference, basis, selected.select, &selected.eigenvectors, delta);
+            return Ok((format!("descriptor '{name}'"), selected.eigenvectors.len(), shape));
         }
         if let Some(components) = self.pca {
             if components == 0 {

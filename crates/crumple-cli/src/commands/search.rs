@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 use crumple::Error;
-use crumple::descriptor;
 use crumple::similarity;
 use crumple::study::{Loaded, Rows};
 use serde_json::json;
@@ -18,7 +17,7 @@ use crate::output::{Output, table, time};
 pub(crate) struct Search {
     /// Folder of the study
     study: PathBuf,
-    /// Name of a descriptor of the study, or the path of its file
+    /// What to compare with: a descriptor of the study by name, the path of its file, a mode, or a run
     descriptor: String,
     /// How many results, best first
     #[arg(long, value_name = "N", default_value_t = 20, allow_negative_numbers = true)]
@@ -34,11 +33,11 @@ impl Search {
     pub(crate) fn run(&self, output: &Output) -> Result<Answer, Error> {
         let (options, rows) = (self.similarity.options()?, rows(self.states.as_deref())?);
         let loaded = Loaded::open(&self.study)?;
-        let descriptor = descriptor::load(&loaded.study, &self.descriptor)?;
+        let descriptor = self.similarity.descriptor(&loaded, &self.descriptor)?;
         let mut hits = similarity::search(&loaded, &descriptor, options, rows)?;
         let searched = hits.len();
         hits.truncate(self.top);
-        output.print(&json!({ "descriptor": descriptor.name, "searched": searched, "results": hits }), || {
+        output.print(&json!({ "descriptor": descriptor.name, "kind": options.kind.unwrap_or(descriptor.kind), "searched": searched, "results": hits }), || {
             let cells = hits.iter().zip(1..).map(|(hit, rank)| {
                 vec![
                     rank.to_string(),

@@ -8,6 +8,7 @@ mod transform;
 
 use std::ops::Range;
 
+use faer::{Mat, Side};
 use mesh_spectrum::{EigenOptions, OperatorError, OperatorOptions, Tie, Watch};
 use serde::{Deserialize, Serialize};
 
@@ -17,6 +18,7 @@ pub use transform::{coefficients, synthesize};
 use crate::Error;
 use crate::joints::Join;
 use crate::reference::Reference;
+use crate::vector::Vector;
 
 /// What is asked of the eigenbasis.
 #[derive(Debug, Clone, PartialEq)]
@@ -73,6 +75,9 @@ pub struct BasisFacts {
     pub join_advice: Option<f64>,
     /// Area of the surface, in length².
     pub area: f64,
+    /// Length of the surface, in length: √12 times its largest standard deviation along a line, which is the length of a
+    /// straight uniform beam.
+    pub length: f64,
     /// Edges with more than two faces.
     pub non_manifold_edges: usize,
     /// Triangles without area, which are left out.
@@ -110,12 +115,11 @@ impl Basis {
         let inspection = mesh_spectrum::inspect(&reference.mesh);
         let distance = join.and_then(Join::distance);
         let operator =
-            mesh_spectrum::operator(&reference.mesh, &OperatorOptions { join: distance, ties: ties.to_vec() }).map_err(
-                |error| match error {
+            mesh_spectrum::operator(&reference.mesh, &OperatorOptions { join: distance, ties: ties.to_vec() })
+                .map_err(|error| match error {
                     OperatorError::Join(error) => Error::Join(error),
                     error => Error::Operator(error),
-                },
-            )?;
+                })?;
         let solved =
             mesh_spectrum::eigenbasis(&operator, &EigenOptions { count: eigenpairs, ..Default::default() }, watch)?;
         let eigenvectors: Vec<f32> = solved.eigenvectors.iter().map(|&x| x as f32).collect();
@@ -130,6 +134,7 @@ impl Basis {
             null_space: solved.certificate.components,
             join_advice: inspection.gap.filter(|_| join.is_none()),
             area: inspection.area,
+            length: length_of(reference.mesh.vertices(), &operator.vertex_mass),
             non_manifold_edges: inspection.non_manifold_edges,
             flat_triangles: inspection.triangles_without_area,
             residual: solved.certificate.residual_max,
@@ -173,6 +178,16 @@ impl Basis {
         let count = self.facts.null_space.max(2).min(self.eigenpairs());
         1..count + 1
     }
+}
+
+/// √12 times the largest standard deviation of the surface along a line.
+fn length_of(vertices: &[Vector], mass: &[f64]) -> f64 {
+    let area: f64 = mass.iter().sum();
+    let mean = |of: &dyn Fn(&Vector) -> f64| vertices.iter().zip(mass).map(|(p, m)| m * of(p)).sum::<f64>() / area;
+    let centre: Vector = std::array::from_fn(|c| mean(&|p| p[c]));
+    let covariance = Mat::from_fn(3, 3, |a, b| mean(&|p| (p[a] - centre[a]) * (p[b] - centre[b])));
+    let variances = covariance.self_adjoint_eigenvalues(Side::Lower).unwrap_or_default();
+    (12.0 * variances.last().copied().unwrap_or(0.0)).sqrt()
 }
 
 /// Largest ‖Lφ − λMφ‖ in the M⁻¹ norm over λ_K, on the degrees of freedom of the operator.

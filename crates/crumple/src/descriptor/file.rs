@@ -2,10 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use super::Descriptor;
+use super::{Descriptor, Selected};
 use crate::Error;
 use crate::error::io;
 use crate::modes::Modes;
+use crate::rotation::OCTAVES;
 use crate::study::{DESCRIPTORS, Study, store};
 
 /// Saves a descriptor in its study; one of the same name is replaced.
@@ -37,7 +38,7 @@ pub fn save(study: &Study, descriptor: &Descriptor) -> Result<PathBuf, Error> {
 pub fn load(study: &Study, name: &str) -> Result<Descriptor, Error> {
     let inside = study.folder().join(DESCRIPTORS).join(format!("{name}.json"));
     let path = if inside.is_file() { inside } else { PathBuf::from(name) };
-    if !path.is_file() {
+    if !path.is_file() || path.extension().is_none_or(|extension| extension != "json") {
         let names = list(study)?;
         let available = if names.is_empty() { "none yet".to_owned() } else { names.join(", ") };
         return Err(Error::UnknownDescriptor { asked: name.to_owned(), available });
@@ -53,20 +54,36 @@ fn read(path: &Path, study: &Study) -> Result<Descriptor, Error> {
     if descriptor.basis != *expected {
         return Err(Error::OtherBasis { name: descriptor.name, found: descriptor.basis, expected: expected.clone() });
     }
-    let (j, values, k) = (&descriptor.eigenvectors, &descriptor.values, study.manifest().eigenpairs);
-    if j.is_empty() || j.len() != values.len() {
-        return Err(unusable(format!("{} eigenvectors and {} values", j.len(), values.len())));
+    for selected in descriptor.blocks() {
+        check(selected, study.manifest().eigenpairs).map_err(unusable)?;
     }
-    if let Some(outside) = j.iter().find(|j| !(1..=k).contains(*j)) {
-        return Err(unusable(format!("eigenvector {outside}; the study has 1 to {k}")));
-    }
-    if !j.windows(2).all(|pair| pair[0] < pair[1]) {
-        return Err(unusable("its eigenvectors do not rise".into()));
-    }
-    if !values.as_flattened().iter().all(|x| x.is_finite()) {
-        return Err(unusable("a value is not a number".into()));
+    let spectrum = &descriptor.spectrum;
+    if !spectrum.numbers().iter().all(|x| x.is_finite()) || spectrum.kind.len() != OCTAVES {
+        return Err(unusable(format!("its rotation spectrum is not {OCTAVES} numbers of its kind and a direction")));
     }
     Ok(descriptor)
+}
+
+/// Says what is wrong with a selection.
+fn check(selected: &Selected, eigenpairs: usize) -> Result<(), String> {
+    let (j, values) = (&selected.eigenvectors, &selected.values);
+    if j.is_empty() || j.len() != values.len() {
+        return Err(format!("{} eigenvectors and {} values", j.len(), values.len()));
+    }
+    if let Some(outside) = j.iter().find(|j| !(1..=eigenpairs).contains(*j)) {
+        return Err(format!("eigenvector {outside}; the study has 1 to {eigenpairs}"));
+    }
+    if !j.windows(2).all(|pair| pair[0] < pair[1]) {
+        return Err("its eigenvectors do not rise".into());
+    }
+    let components = selected.function().components();
+    if let Some(value) = values.iter().find(|value| value.len() != components) {
+        return Err(format!("a value has {} numbers, expected {components}", value.len()));
+    }
+    if !values.iter().flatten().chain([&selected.scale]).all(|x| x.is_finite()) {
+        return Err("a value is not a number".into());
+    }
+    Ok(())
 }
 
 /// Removes descriptors that were made for a mode which is gone or has another typical run now: a search by the name of

@@ -61,7 +61,8 @@ impl Threshold {
         }
     }
 
-    /// Applies the rule to the coefficients of one state, K × 3.
+    /// Applies the rule to the coefficients of one state, K × 3, of which the first `components` of each triple count.
+    /// `signed`: a value is compared as it is, as the paper's equation is printed, not by its magnitude.
     ///
     /// `rms_with_first(order, m)` gives the RMS error of a reconstruction from the first m eigenvectors of `order`;
     /// it is asked only by [`Threshold::Error`].
@@ -71,19 +72,24 @@ impl Threshold {
     pub fn select(
         &self,
         values: &[[f64; 3]],
+        components: usize,
+        signed: bool,
         rms_with_first: impl Fn(&[usize], usize) -> f64,
     ) -> Result<Selection, Error> {
         self.checked()?;
-        let largest: Vec<f64> =
-            values.iter().map(|triple| triple.iter().fold(0.0, |most: f64, x| most.max(x.abs()))).collect();
+        let looked_at = |x: &f64| if signed { *x } else { x.abs() };
+        let largest: Vec<f64> = values
+            .iter()
+            .map(|triple| triple[..components].iter().map(looked_at).fold(f64::NEG_INFINITY, f64::max))
+            .collect();
         let fail = |what: String| Error::Threshold { rule: self.to_string(), what };
-        let count = (3 * values.len()) as f64;
-        let magnitudes = || values.iter().flatten().map(|x| x.abs());
+        let count = (components * values.len()) as f64;
+        let magnitudes = || values.iter().flat_map(|triple| &triple[..components]).map(looked_at);
         let mean = magnitudes().sum::<f64>() / count;
         let above = |t: f64| {
             let eigenvectors: Vec<usize> = (1..=values.len()).filter(|&j| largest[j - 1] > t).collect();
-            let most = largest.iter().copied().fold(0.0, f64::max);
-            if most == 0.0 {
+            let most = largest.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            if values.as_flattened().iter().all(|&x| x == 0.0) {
                 Err(fail("all coefficients are zero: the state is the undeformed one".into()))
             } else if eigenvectors.is_empty() {
                 Err(fail(format!("no coefficient is larger than t = {t:.6}; the largest is {most:.6}")))
@@ -203,7 +209,7 @@ mod tests {
         let rms = |order: &[usize], m: usize| {
             order[m..].iter().map(|&j| VALUES[j - 1].iter().map(|x| x * x).sum::<f64>()).sum::<f64>().sqrt()
         };
-        Ok(rule.parse::<Threshold>()?.select(&VALUES, rms)?.eigenvectors)
+        Ok(rule.parse::<Threshold>()?.select(&VALUES, 3, false, rms)?.eigenvectors)
     }
 
     #[test]
@@ -218,6 +224,22 @@ mod tests {
         assert_eq!(selected("energy:0.7").unwrap(), [1, 4]); // 136 of 155 is the first to reach it
         assert_eq!(selected("error:1.8").unwrap(), [1, 2, 4]); // √3 is left
         assert_eq!(selected("error:0.1").unwrap(), [1, 2, 3, 4]);
+    }
+
+    #[test]
+    fn the_equation_as_printed_keeps_only_large_positive_values() {
+        // Without bars: mean 13/12 + … of signed values; −4 is never above t.
+        let rms = |_: &[usize], _: usize| 0.0;
+        let kept = |rule: &str| rule.parse::<Threshold>().unwrap().select(&VALUES, 3, true, rms).unwrap().eigenvectors;
+        assert_eq!(kept("value:0.5"), [1, 3, 4]);
+        assert_eq!(kept("top:3"), [1, 3, 4]);
+    }
+
+    #[test]
+    fn a_scalar_has_one_component() {
+        let values = [[10.0, 0.0, 0.0], [1.0, 0.0, 0.0], [-7.0, 0.0, 0.0]];
+        let kept = Threshold::Mean(1.0).select(&values, 1, false, |_, _| 0.0).unwrap();
+        assert_eq!((kept.eigenvectors, kept.threshold), (vec![1, 3], 6.0));
     }
 
     #[test]

@@ -44,7 +44,8 @@ impl<'a> Closest<'a> {
         let place = |x: f64| (x / width).floor() as i64;
         for &triangle in triangles {
             let corners = corners(mesh, triangle);
-            let low: [i64; 3] = std::array::from_fn(|c| place(corners.iter().map(|p| p[c]).fold(f64::INFINITY, f64::min)));
+            let low: [i64; 3] =
+                std::array::from_fn(|c| place(corners.iter().map(|p| p[c]).fold(f64::INFINITY, f64::min)));
             let high: [i64; 3] =
                 std::array::from_fn(|c| place(corners.iter().map(|p| p[c]).fold(f64::NEG_INFINITY, f64::max)));
             for x in low[0]..=high[0] {
@@ -70,9 +71,8 @@ impl<'a> Closest<'a> {
                 for z in low[2]..=high[2] {
                     for &triangle in self.boxes.get(&[x, y, z]).into_iter().flatten().filter(|&&t| wanted(t)) {
                         let foot = foot(self.mesh, triangle, point);
-                        let better = best.is_none_or(|old| {
-                            (foot.distance, foot.triangle) < (old.distance, old.triangle)
-                        });
+                        let better =
+                            best.is_none_or(|old| (foot.distance, foot.triangle) < (old.distance, old.triangle));
                         if foot.distance <= radius && better {
                             best = Some(foot);
                         }
@@ -162,7 +162,15 @@ mod tests {
     fn the_nearest_point_is_in_every_region_of_a_triangle_the_nearest_of_a_fine_grid() {
         let mesh = Mesh::new(vec![[0.0; 3], [4.0, 0.0, 0.0], [1.0, 3.0, 0.0]], vec![[0, 1, 2]]).unwrap();
         let steps = 60;
-        for p in [[-1.0, -1.0, 1.0], [5.0, -1.0, 0.0], [1.0, 5.0, 0.5], [2.0, -2.0, 0.0], [4.0, 3.0, 1.0], [-1.0, 2.0, 0.0], [1.5, 1.0, 2.0]] {
+        for p in [
+            [-1.0, -1.0, 1.0],
+            [5.0, -1.0, 0.0],
+            [1.0, 5.0, 0.5],
+            [2.0, -2.0, 0.0],
+            [4.0, 3.0, 1.0],
+            [-1.0, 2.0, 0.0],
+            [1.5, 1.0, 2.0],
+        ] {
             let found = foot(&mesh, 0, p);
             let mut least = f64::INFINITY;
             for i in 0..=steps {

@@ -112,7 +112,8 @@ impl Groups {
     fn mutual(&self, mesh: &Mesh, group: &[u32], patch: &[usize], of: [usize; 2], pairs: &mut Vec<(u32, u32)>) {
         let members = |which: usize| -> Vec<usize> { (0..group.len()).filter(|&at| patch[at] == which).collect() };
         let (p, q) = (members(of[0]), members(of[1]));
-        let length = |a: usize, b: usize| distance(mesh.vertices()[group[a] as usize], mesh.vertices()[group[b] as usize]);
+        let length =
+            |a: usize, b: usize| distance(mesh.vertices()[group[a] as usize], mesh.vertices()[group[b] as usize]);
         let nearest = |from: usize, among: &[usize]| {
             among.iter().copied().min_by(|&a, &b| length(from, a).total_cmp(&length(from, b)).then(a.cmp(&b)))
         };

@@ -217,9 +217,8 @@ impl<'a> Finder<'a> {
             let [of_nodes, of_faces] = tie.thickness;
             let given = of_nodes < 0.0 || of_faces < 0.0;
             let own = |value: f64, thickness: f64| if value == 0.0 { thickness } else { value.abs() };
-            let thickness_of = |face: &Face| {
-                own(of_faces, face.shell.map_or(0.0, |shell| self.resolver.shell_thickness(shell)))
-            };
+            let thickness_of =
+                |face: &Face| own(of_faces, face.shell.map_or(0.0, |shell| self.resolver.shell_thickness(shell)));
             let thickness_of_triangle = self.triangles(&faces, thickness_of);
             let triangles: Vec<u32> = {
                 let mut all: Vec<u32> = thickness_of_triangle.keys().copied().collect();
@@ -227,7 +226,8 @@ impl<'a> Finder<'a> {
                 all
             };
             if triangles.is_empty() {
-                self.notes.push(format!("{}: *{}: no face of its second side is on the surface", tie.place, tie.keyword));
+                self.notes
+                    .push(format!("{}: *{}: no face of its second side is on the surface", tie.place, tie.keyword));
                 continue;
             }
             let mesh = &self.reference.mesh;
@@ -243,7 +243,8 @@ impl<'a> Finder<'a> {
                 let radius = (0.6 * (thickness + most_thickness)).max(most_diagonal).max(1e-9 * most_diagonal);
                 let other = |triangle: u32| vertex.is_none_or(|v| !mesh.triangles()[triangle as usize].contains(&v));
                 let reached = closest.find(position, radius, other).filter(|foot| {
-                    let reach = (0.6 * (thickness + thickness_of_triangle[&foot.triangle])).max(twentieth(foot.triangle));
+                    let reach =
+                        (0.6 * (thickness + thickness_of_triangle[&foot.triangle])).max(twentieth(foot.triangle));
                     foot.distance <= reach && foot.outside <= 0.05 * self.longest_side(foot.triangle)
                 });
                 match reached {
@@ -354,7 +355,9 @@ impl<'a> Finder<'a> {
         let (vertex, to) = match (a, b) {
             (Anchor::Vertex(a), Anchor::Vertex(b)) if a == b => return,
             (Anchor::Vertex(a), Anchor::Vertex(b)) => (a.max(b), vec![(a.min(b), 1.0)]),
-            (Anchor::Vertex(vertex), Anchor::Point(to, _)) | (Anchor::Point(to, _), Anchor::Vertex(vertex)) => (vertex, to),
+            (Anchor::Vertex(vertex), Anchor::Point(to, _)) | (Anchor::Point(to, _), Anchor::Vertex(vertex)) => {
+                (vertex, to)
+            }
             (Anchor::Point(from, _), Anchor::Point(to, triangle)) => {
                 let most = from.iter().fold((0, 0.0), |most, next| if next.1 > most.1 { *next } else { most });
                 let vertex = most.0;
@@ -450,7 +453,8 @@ impl<'a> Finder<'a> {
 }
 
 /// Materials whose elements join others: spot welds, adhesives, cohesive layers.
-const WELD_MATERIALS: &[&str] = &["SPOTWELD", "MAT_100", "COHESIVE", "ADHESIVE", "MAT_138", "MAT_169", "MAT_184", "MAT_185", "MAT_186", "MAT_240"];
+const WELD_MATERIALS: &[&str] =
+    &["SPOTWELD", "MAT_100", "COHESIVE", "ADHESIVE", "MAT_138", "MAT_169", "MAT_184", "MAT_185", "MAT_186", "MAT_240"];
 
 /// Whether a part's elements weld: by its material, or by the formulation of its section.
 fn welds(resolver: &Resolver<'_>, part: u64, formulations: &[i64]) -> bool {

@@ -16,7 +16,8 @@ use crate::descriptor::{self, DescribeOptions, Described, FIRST_M, Rival, Thresh
 use crate::joints::Join;
 use crate::modes::{By, Mode, Modes, Tried};
 use crate::reconstruct::Errors;
-use crate::similarity::{Comparer, SimilarityOptions};
+use crate::select::Kind;
+use crate::similarity::{Hit, SimilarityOptions, search};
 use crate::study::{Loaded, Rows, RunRecord};
 use crate::target::Named;
 
@@ -78,7 +79,8 @@ struct RunData {
     /// Times of the points of the cloud.
     times: Vec<f64>,
     cloud: Vec<[f64; 3]>,
-    similarity: BTreeMap<String, f64>,
+    /// To each mode's descriptor: by rotation, and by the paper's kind.
+    similarity: BTreeMap<String, [f64; 2]>,
     distance_to_medoid: Option<f64>,
     silhouette: Option<f64>,
     max_displacement: f64,
@@ -110,10 +112,11 @@ struct DescriptorData {
     size: usize,
     numbers: usize,
     eigenvectors: Vec<usize>,
-    errors: Errors,
+    errors: Option<Errors>,
     rivals: Vec<Rival>,
     spectrum: Vec<[f64; 3]>,
     nearest: Vec<Nearest>,
+    nearest_paper: Vec<Nearest>,
     shapes: BTreeMap<&'static str, String>,
 }
 
@@ -133,8 +136,12 @@ impl Findings {
 /// At most about this many points in the cloud, and the last state of every run.
 const POINTS_MAX: usize = 20_000;
 
-/// Name of a mode, and the similarity of each run to its descriptor, runs in the order of the manifest.
-type Similarities = (String, Vec<(String, f64)>);
+/// Runs by their similarity to a mode's descriptor, best first.
+struct Similarities {
+    mode: String,
+    rotation: Vec<Hit>,
+    paper: Vec<Hit>,
+}
 
 /// Describes the medoid of every mode. Without `asked`, a mode is described as the saved descriptor of its name was, or
 /// by the defaults where there is none.
@@ -163,7 +170,14 @@ pub fn describe_modes(
 
 fn as_saved(loaded: &Loaded, mode: &Mode) -> Option<DescribeOptions> {
     let saved = descriptor::load(&loaded.study, &mode.name).ok().filter(|saved| saved.run == mode.medoid)?;
-    Some(DescribeOptions { select: saved.select, threshold: saved.rule.parse().ok()? })
+    let selected = &saved.selected;
+    Some(DescribeOptions {
+        kind: saved.kind,
+        select: selected.select,
+        threshold: selected.rule.parse().ok()?,
+        signed: selected.signed,
+        ..Default::default()
+    })
 }
 
 /// Gathers the findings of a study from its modes and the description of each.
@@ -245,14 +259,18 @@ fn study_facts(loaded: &Loaded) -> StudyFacts {
     }
 }
 
-/// Similarity of every run to every mode's descriptor.
+/// Every run's similarity to every mode's descriptor, best first, by rotation and by the paper's kind.
 fn similarities(loaded: &Loaded, described: &[Described]) -> Result<Vec<Similarities>, Error> {
     let of = |described: &Described| {
-        let comparer = Comparer::new(loaded, &described.descriptor, SimilarityOptions::default())?;
-        let rows = loaded.study.coefficients(Some(comparer.eigenvectors()), Rows::Last)?;
-        let scores =
-            (0..rows.rows()).map(|row| (rows.runs[row].clone(), comparer.score(rows.row(row)).similarity)).collect();
-        Ok((described.descriptor.name.clone(), scores))
+        let by = |kind| {
+            let options = SimilarityOptions { kind: Some(kind), ..Default::default() };
+            search(loaded, &described.descriptor, options, Rows::Last)
+        };
+        Ok(Similarities {
+            mode: described.descriptor.name.clone(),
+            rotation: by(Kind::Rotation)?,
+            paper: by(Kind::Paper)?,
+        })
     };
     described.iter().map(of).collect()
 }
@@ -271,18 +289,20 @@ fn run_data(loaded: &Loaded, modes: &Modes, cloud: usize, similarity: &[Similari
         clouds.entry(&rows.runs[row]).or_default().push(std::array::from_fn(|c| baseline[c] + f64::from(delta[c])));
     }
     let membership: BTreeMap<&str, _> = modes.runs.iter().map(|run| (run.run.as_str(), run)).collect();
-    let by_run: BTreeMap<&str, BTreeMap<String, f64>> =
-        similarity.iter().fold(BTreeMap::new(), |mut by_run, (mode, scores)| {
-            for (run, score) in scores {
-                by_run.entry(run.as_str()).or_insert_with(BTreeMap::new).insert(mode.clone(), *score);
+    let mut by_run: BTreeMap<&str, BTreeMap<String, [f64; 2]>> = BTreeMap::new();
+    for found in similarity {
+        for (place, hits) in [&found.rotation, &found.paper].into_iter().enumerate() {
+            for hit in hits {
+                let of_run = by_run.entry(&hit.run).or_default();
+                of_run.entry(found.mode.clone()).or_default()[place] = hit.score.similarity;
             }
-            by_run
-        });
+        }
+    }
     let data = manifest.runs.iter().map(|(id, record)| {
         let member = membership.get(id.as_str());
         RunData {
             id: id.clone(),
-            mode: member.map(|member| member.mode.clone()),
+            mode: member.and_then(|member| member.mode.clone()),
             outlier: member.is_some_and(|member| member.outlier),
             states: record.times.len(),
             times: record
@@ -294,8 +314,8 @@ fn run_data(loaded: &Loaded, modes: &Modes, cloud: usize, similarity: &[Similari
                 .collect(),
             cloud: clouds.remove(id.as_str()).unwrap_or_default(),
             similarity: by_run.get(id.as_str()).cloned().unwrap_or_default(),
-            distance_to_medoid: member.map(|member| member.distance),
-            silhouette: member.map(|member| member.silhouette),
+            distance_to_medoid: member.and_then(|member| member.distance),
+            silhouette: member.and_then(|member| member.silhouette),
             max_displacement: record.last.max,
             rigid_share: record.last.rigid_share,
             captured: record.last.captured,
@@ -324,15 +344,12 @@ fn mode_data(
         range,
         &View::of(loaded.reference.mesh.vertices()),
     );
-    let mut nearest: Vec<Nearest> = similarity
-        .iter()
-        .filter(|(name, _)| *name == mode.name)
-        .flat_map(|(_, scores)| scores)
-        .filter(|(run, _)| *run != mode.medoid)
-        .map(|(run, similarity)| Nearest { run: run.clone(), similarity: *similarity })
-        .collect();
-    nearest.sort_by(|a, b| b.similarity.total_cmp(&a.similarity).then_with(|| a.run.cmp(&b.run)));
-    nearest.truncate(9);
+    let nearest = |hits: &[Hit]| -> Vec<Nearest> {
+        let others = hits.iter().filter(|hit| hit.run != mode.medoid).take(9);
+        others.map(|hit| Nearest { run: hit.run.clone(), similarity: hit.score.similarity }).collect()
+    };
+    let found = similarity.iter().find(|found| found.mode == mode.name);
+    let selected = &descriptor.selected;
     let shape = |what: &str| format!("{}:{what}", mode.name);
     ModeData {
         name: mode.name.clone(),
@@ -344,16 +361,17 @@ fn mode_data(
         words: mode_words(loaded, &described.original),
         picture: format!("data:image/png;base64,{}", base64::engine::general_purpose::STANDARD.encode(png)),
         descriptor: DescriptorData {
-            select: descriptor.select.word(),
-            rule: descriptor.rule.parse::<Threshold>().map_or_else(|_| descriptor.rule.clone(), |rule| rule.words()),
-            threshold: descriptor.threshold,
-            size: descriptor.eigenvectors.len(),
-            numbers: 3 * descriptor.eigenvectors.len(),
-            eigenvectors: descriptor.eigenvectors.clone(),
-            errors: descriptor.errors,
-            rivals: descriptor.rivals.iter().map(named_for_the_page).collect(),
+            select: selected.select.word(),
+            rule: selected.rule.parse::<Threshold>().map_or_else(|_| selected.rule.clone(), |rule| rule.words()),
+            threshold: selected.threshold,
+            size: descriptor.size(),
+            numbers: descriptor.numbers(),
+            eigenvectors: selected.eigenvectors.clone(),
+            errors: selected.errors,
+            rivals: selected.rivals.iter().map(named_for_the_page).collect(),
             spectrum: described.values.iter().map(|triple| triple.map(f64::abs)).collect(),
-            nearest,
+            nearest: found.map(|found| nearest(&found.rotation)).unwrap_or_default(),
+            nearest_paper: found.map(|found| nearest(&found.paper)).unwrap_or_default(),
             shapes: BTreeMap::from([
                 ("original", format!("run:{}", mode.medoid)),
                 ("first_k", shape("first_k")),

@@ -13,7 +13,7 @@ use crate::descriptor::Described;
 use crate::modes::Modes;
 use crate::reconstruct::displaced;
 use crate::study::Loaded;
-use crate::target::{self, Named, Target};
+use crate::target::{self, Named};
 
 /// Shapes on the page take at most this many bytes before base64.
 const SHAPE_BYTES: usize = 3_500_000;
@@ -94,16 +94,10 @@ fn last_shape(loaded: &Loaded, row: usize) -> Result<Vec<[f64; 3]>, Error> {
     let rows = loaded.last_states()?;
     let delta = rows.triples(row);
     let run = rows.runs[row].clone();
-    let target = Target {
-        run: run.clone(),
-        state: rows.states[row] as usize,
-        time: rows.times[row],
-        delta,
-        warnings: Vec::new(),
-    };
-    let from_file = target::shape(loaded, &Named { run, state: None }, &target);
+    let named = Named { run, state: None };
+    let from_file = target::resolve(loaded, &named).and_then(|target| target::shape(loaded, &named, &target));
     Ok(from_file.unwrap_or_else(|_| {
         let all: Vec<usize> = (1..=loaded.basis.eigenpairs()).collect();
-        displaced(&loaded.reference, &synthesize(&loaded.basis, &all, &target.delta))
+        displaced(&loaded.reference, &synthesize(&loaded.basis, &all, &delta))
     }))
 }

@@ -3,8 +3,8 @@
 use std::cmp::Ordering;
 
 use super::shapes::z_displacement;
-use crate::modes::Modes;
 use crate::basis::BasisFacts;
+use crate::modes::Modes;
 use crate::study::{Loaded, RunRecord, Study};
 
 /// In words: the mesh is several pieces, what that does, and what helps.

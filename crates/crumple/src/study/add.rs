@@ -9,7 +9,7 @@ use super::store::Lock;
 use super::{Error, FileRecord, LOCK, Manifest, RunRecord, Study, WRITERS, absolute, coefficients, tables};
 use crate::bundle::Found;
 use crate::inputs::Table;
-use crate::project::{Projected, Projector};
+use crate::project::{Projected, Projector, Spent};
 use crate::run::Run;
 use mesh_spectrum::Watch;
 
@@ -39,6 +39,8 @@ pub struct Added {
     pub skipped: Vec<(String, String)>,
     /// What the user should know.
     pub notes: Vec<String>,
+    /// Time of all threads that projecting took.
+    pub spent: Spent,
 }
 
 /// Runs projected before a part is written; bounds memory.
@@ -82,11 +84,13 @@ impl Study {
             return Ok(result);
         }
         let (reference, basis) = (self.reference()?, self.basis()?);
-        let projector = Projector::new(&reference, &basis);
+        let fields = self.settings.fields.clone();
+        let projector = Projector::new(&reference, &basis, &fields);
         let work = Work { projector, total: todo.len(), done: Mutex::new(0), watch };
         for batch in todo.chunks(PART_RUNS) {
             let written = self.write_batch(&work, batch, &options)?;
             result.skipped.extend(written.failures);
+            result.spent += written.spent;
             waiting.extend(written.records);
             if written.stopped {
                 // What is finished is kept, also beside a bad run: that one is found again when the add is repeated.
@@ -112,6 +116,7 @@ impl Study {
         for (run, outcome) in work.project_all(batch) {
             match outcome.and_then(|(stamp, states)| self.not_changed(states, options).map(|states| (stamp, states))) {
                 Ok((stamp, states)) => {
+                    written.spent += states.spent;
                     projected.push(states);
                     runs.push((run, stamp));
                 }
@@ -251,6 +256,7 @@ struct Written {
     records: BTreeMap<String, RunRecord>,
     failures: Vec<(String, String)>,
     stopped: bool,
+    spent: Spent,
 }
 
 /// A projected run, and the stamp that its files had before they were read.

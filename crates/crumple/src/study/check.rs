@@ -111,7 +111,11 @@ fn join_not_held(loaded: &Loaded) -> Result<Option<String>, Error> {
         },
     };
     if ties.len() != basis.facts.joined_pairs {
-        return Ok(Some(format!("{} vertices are joined, the basis was made with {}", ties.len(), basis.facts.joined_pairs)));
+        return Ok(Some(format!(
+            "{} vertices are joined, the basis was made with {}",
+            ties.len(),
+            basis.facts.joined_pairs
+        )));
     }
     // A tie of a vertex that others hold already says nothing; the basis was made without it.
     let mut broken: Vec<bool> = vec![false; ties.len()];
@@ -125,6 +129,10 @@ fn join_not_held(loaded: &Loaded) -> Result<Option<String>, Error> {
     }
     let count = broken.iter().filter(|broken| **broken).count();
     Ok((count > basis.facts.idle_ties).then(|| {
-        format!("{count} of {} ties are not held by the eigenvectors, {} are known to say nothing", ties.len(), basis.facts.idle_ties)
+        format!(
+            "{count} of {} ties are not held by the eigenvectors, {} are known to say nothing",
+            ties.len(),
+            basis.facts.idle_ties
+        )
     }))
 }

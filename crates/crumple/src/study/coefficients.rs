@@ -1,7 +1,7 @@
 //! Coefficient parts on disk: Parquet, one row a state, columns so laid that a descriptor reads only its own.
 //!
-//! `run`, `state`, `time`, six measures, then `d1_x`, `d1_y`, `d1_z`, `d2_x`, …: δ of eigenvector j (counted from 1),
-//! and `r1_x`, …: ρ of the rotation field; all in f32. A part is never changed; its name is the hash of its content.
+//! `run`, `state`, `time`, measures, then `d1_x`, `d1_y`, `d1_z`, `d2_x`, …: δ of eigenvector j (counted from 1),
+//! `r1_x`, …: ρ of the rotation field, and for each field that the study keeps `plastic_strain_1`, …; all in f32. A part is never changed; its name is the hash of its content.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -18,7 +18,8 @@ use parquet::file::reader::ChunkReader;
 use super::{Manifest, store};
 use crate::Error;
 use crate::error::io;
-use crate::project::{Projected, ProjectedState};
+use crate::field::Field as Quantity;
+use crate::project::{Measures, Projected, ProjectedState};
 
 /// Folder of the parts in a study.
 pub(crate) const FOLDER: &str = "coefficients";
@@ -29,16 +30,65 @@ const LAST_STATES: usize = 0;
 /// Key of the basis' content name in a part's metadata.
 const BASIS: &str = "crumple.basis";
 const COMPONENTS: [char; 3] = ['x', 'y', 'z'];
-const MEASURES: [&str; 6] = ["rms", "max", "captured", "rigid_share", "strain_median", "strain_p95"];
 
 /// The function on the surface that was projected.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub enum Function {
     /// p − p⁰: coefficients δ, in length².
     #[default]
     Displacement,
     /// The rotation field: coefficients ρ, in length.
     Rotation,
+    /// A quantity of the result files: coefficients in its unit times length.
+    Field(Quantity),
+}
+
+impl Function {
+    /// Numbers a vertex, and so an eigenvector, has: 3, or 1 for a scalar field.
+    pub fn components(self) -> usize {
+        match self {
+            Self::Displacement | Self::Rotation => 3,
+            Self::Field(field) => field.components(),
+        }
+    }
+
+    /// Column of its root mean square over the surface.
+    fn rms_column(self) -> Option<&'static str> {
+        match self {
+            Self::Displacement => Some("rms"),
+            Self::Rotation => Some("turn"),
+            Self::Field(_) => None,
+        }
+    }
+
+    /// Its coefficients in a projected state, K × components.
+    fn of(self, state: &ProjectedState) -> &[f32] {
+        match self {
+            Self::Displacement => &state.delta,
+            Self::Rotation => &state.rotation,
+            Self::Field(field) => {
+                state.fields.iter().find(|(name, _)| *name == field).map_or(&[], |(_, values)| values)
+            }
+        }
+    }
+}
+
+/// Coefficients that a comparison reads: all K of a function, or those of some eigenvectors.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Need {
+    /// What was projected.
+    pub function: Function,
+    /// Eigenvectors, counted from 1; all when `None`.
+    pub eigenvectors: Option<Vec<usize>>,
+}
+
+/// Stored coefficients of one function in one state.
+#[derive(Debug, Clone, Copy)]
+pub struct Stored<'a> {
+    /// Coefficients, as the need says.
+    pub values: &'a [f32],
+    /// Root mean square of the whole function over the surface; 0 for fields.
+    pub rms: f64,
 }
 
 /// Rows of coefficients, sorted by run and state.
@@ -54,7 +104,10 @@ pub struct Coefficients {
     pub states: Vec<u32>,
     /// Time of each row.
     pub times: Vec<f64>,
-    /// δ or ρ, as `function` says, rows × 3|eigenvectors|, row-major: x, y, z of the first eigenvector, then of the next.
+    /// Root mean square of the whole function over the surface, for each row; empty for fields.
+    pub rms: Vec<f64>,
+    /// Coefficients of `function`, rows × components · |eigenvectors|, row-major: all components of the first
+    /// eigenvector, then of the next.
     pub values: Vec<f32>,
 }
 
@@ -64,13 +117,23 @@ impl Coefficients {
         self.runs.len()
     }
 
-    /// One row, 3 |eigenvectors| numbers.
+    /// Numbers a row has.
+    pub fn width(&self) -> usize {
+        self.function.components() * self.eigenvectors.len()
+    }
+
+    /// One row, [`Coefficients::width`] numbers.
     pub fn row(&self, row: usize) -> &[f32] {
-        let width = 3 * self.eigenvectors.len();
+        let width = self.width();
         &self.values[row * width..(row + 1) * width]
     }
 
-    /// One row as |eigenvectors| × 3.
+    /// One row as a comparison takes it.
+    pub fn stored(&self, row: usize) -> Stored<'_> {
+        Stored { values: self.row(row), rms: self.rms.get(row).copied().unwrap_or(0.0) }
+    }
+
+    /// One row of a vector function as |eigenvectors| × 3.
     pub fn triples(&self, row: usize) -> Vec<[f64; 3]> {
         triples(self.row(row))
     }
@@ -80,6 +143,7 @@ impl Coefficients {
         self.runs.append(&mut other.runs);
         self.states.append(&mut other.states);
         self.times.append(&mut other.times);
+        self.rms.append(&mut other.rms);
         self.values.append(&mut other.values);
     }
 
@@ -91,6 +155,7 @@ impl Coefficients {
             runs: order.iter().map(|&row| self.runs[row].clone()).collect(),
             states: order.iter().map(|&row| self.states[row]).collect(),
             times: order.iter().map(|&row| self.times[row]).collect(),
+            rms: order.iter().filter_map(|&row| self.rms.get(row).copied()).collect(),
             values: order.iter().flat_map(|&row| self.row(row).iter().copied()).collect(),
             function: self.function,
             eigenvectors: self.eigenvectors,
@@ -145,7 +210,6 @@ fn record_batch<'a>(
     rows: impl Iterator<Item = (&'a str, u32, usize, &'a ProjectedState)>,
 ) -> Result<RecordBatch, Error> {
     let rows: Vec<(&str, u32, &ProjectedState)> = rows.map(|(run, index, _, state)| (run, index, state)).collect();
-    let width = rows.first().map_or(0, |(_, _, state)| state.delta.len());
     let mut fields = vec![
         Field::new("run", DataType::Utf8, false),
         Field::new("state", DataType::UInt32, false),
@@ -156,20 +220,18 @@ fn record_batch<'a>(
         Arc::new(UInt32Array::from_iter_values(rows.iter().map(|row| row.1))),
         Arc::new(Float64Array::from_iter_values(rows.iter().map(|row| row.2.time))),
     ];
-    for (index, name) in MEASURES.iter().enumerate() {
-        fields.push(Field::new(*name, DataType::Float64, false));
-        columns.push(Arc::new(Float64Array::from_iter_values(rows.iter().map(|row| {
-            let m = &row.2.measures;
-            [m.rms, m.max, m.captured, m.rigid_share, m.strain_median, m.strain_p95][index]
-        }))));
+    for (name, of) in Measures::COLUMNS {
+        fields.push(Field::new(name, DataType::Float64, false));
+        columns.push(Arc::new(Float64Array::from_iter_values(rows.iter().map(|row| of(&row.2.measures)))));
     }
-    for function in [Function::Displacement, Function::Rotation] {
+    let kept = rows.first().into_iter().flat_map(|row| &row.2.fields).map(|(field, _)| Function::Field(*field));
+    for function in [Function::Displacement, Function::Rotation].into_iter().chain(kept) {
+        let components = function.components();
+        let width = rows.first().map_or(0, |row| function.of(row.2).len());
         for column in 0..width {
-            let values = rows.iter().map(|(_, _, state)| match function {
-                Function::Displacement => state.delta[column],
-                Function::Rotation => state.rotation[column],
-            });
-            fields.push(Field::new(column_name(function, column / 3 + 1, column % 3), DataType::Float32, false));
+            let name = column_name(function, column / components + 1, column % components);
+            let values = rows.iter().map(|row| function.of(row.2).get(column).copied().unwrap_or_default());
+            fields.push(Field::new(name, DataType::Float32, false));
             columns.push(Arc::new(Float32Array::from_iter_values(values)));
         }
     }
@@ -183,11 +245,13 @@ pub(crate) fn triples(stored: &[f32]) -> Vec<[f64; 3]> {
 
 /// Name of the column of an eigenvector (counted from 1) and a component (0, 1, 2).
 pub fn column_name(function: Function, eigenvector: usize, component: usize) -> String {
-    let letter = match function {
-        Function::Displacement => 'd',
-        Function::Rotation => 'r',
-    };
-    format!("{letter}{eigenvector}_{}", COMPONENTS[component])
+    let axis = COMPONENTS[component];
+    match function {
+        Function::Displacement => format!("d{eigenvector}_{axis}"),
+        Function::Rotation => format!("r{eigenvector}_{axis}"),
+        Function::Field(field) if field.components() == 1 => format!("{}_{eigenvector}", field.column()),
+        Function::Field(field) => format!("{}_{eigenvector}_{axis}", field.column()),
+    }
 }
 
 /// Which rows of a part are wanted.
@@ -215,9 +279,16 @@ pub(crate) fn read_part<R: ChunkReader + 'static>(
     if !entries.clone().any(|entry| entry.key == BASIS && entry.value.as_deref() == Some(wanted.basis)) {
         return Err(damaged("it belongs to another eigenbasis than the study's".into()));
     }
-    let names = ["run", "state", "time"].map(str::to_owned).into_iter();
-    let names: Vec<String> =
-        names.chain(into.eigenvectors.iter().flat_map(|&j| (0..3).map(move |c| column_name(function, j, c)))).collect();
+    let rms = function.rms_column();
+    let facts: Vec<&str> = ["run", "state", "time"].into_iter().chain(rms).collect();
+    let names = facts.iter().map(|name| (*name).to_owned());
+    let names: Vec<String> = names
+        .chain(
+            into.eigenvectors
+                .iter()
+                .flat_map(|&j| (0..function.components()).map(move |c| column_name(function, j, c))),
+        )
+        .collect();
     let schema = builder.parquet_schema();
     let by_name: std::collections::HashMap<&str, usize> =
         schema.columns().iter().zip(0..).map(|(column, leaf)| (column.name(), leaf)).collect();
@@ -235,7 +306,12 @@ pub(crate) fn read_part<R: ChunkReader + 'static>(
         let runs = column("run")?.as_string_opt::<i32>().ok_or_else(|| wrong("run"))?;
         let states = column("state")?.as_primitive_opt::<UInt32Type>().ok_or_else(|| wrong("state"))?.values();
         let times = column("time")?.as_primitive_opt::<Float64Type>().ok_or_else(|| wrong("time"))?.values();
-        let values: Vec<&[f32]> = names[3..]
+        let rms = rms
+            .map(|name| {
+                Ok::<_, Error>(column(name)?.as_primitive_opt::<Float64Type>().ok_or_else(|| wrong(name))?.values())
+            })
+            .transpose()?;
+        let values: Vec<&[f32]> = names[facts.len()..]
             .iter()
             .map(|name| {
                 Ok::<_, Error>(
@@ -247,6 +323,7 @@ pub(crate) fn read_part<R: ChunkReader + 'static>(
             into.runs.push(runs.value(row).to_owned());
             into.states.push(states[row]);
             into.times.push(times[row]);
+            into.rms.extend(rms.map(|rms| rms[row]));
             into.values.extend(values.iter().map(|column| column[row]));
         }
     }

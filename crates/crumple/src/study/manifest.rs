@@ -11,7 +11,7 @@ use crate::error::io;
 use crate::project::Measures;
 
 /// The layout this program writes and reads.
-pub const LAYOUT: u64 = 1;
+pub const LAYOUT: u64 = 2;
 /// Name of the manifest in a study's folder.
 pub(crate) const FILE: &str = "manifest.json";
 

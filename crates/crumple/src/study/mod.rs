@@ -39,7 +39,7 @@ use serde::{Deserialize, Serialize};
 pub use add::{AddOptions, Added};
 pub use check::{Checkup, check};
 pub(crate) use coefficients::triples;
-pub use coefficients::{Coefficients, Function, column_name};
+pub use coefficients::{Coefficients, Function, Need, Stored, column_name};
 pub use loaded::Loaded;
 pub use manifest::{FileRecord, LAYOUT, Manifest, RunRecord};
 pub use mesh_file::write_shape;
@@ -50,6 +50,7 @@ use staged::StagedFolder;
 use crate::Error;
 use crate::basis::{Basis, BasisOptions};
 use crate::error::io;
+use crate::field::Field;
 use crate::joints::{Join, Joints, joints};
 use crate::reference::Reference;
 use crate::run::Run;
@@ -79,6 +80,9 @@ pub struct Settings {
     /// The deck that gave titles and welds, where there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub deck: Option<PathBuf>,
+    /// Quantities of the result files that are projected beside the shape.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fields: Vec<Field>,
     /// The operator.
     pub operator: String,
     /// The mass matrix.
@@ -109,7 +113,8 @@ pub struct Study {
 }
 
 impl Study {
-    /// Makes a study: reference mesh, operator, eigenbasis. The folder appears when everything is in it.
+    /// Makes a study: reference mesh, operator, eigenbasis. `fields` are what will be projected of each run beside its
+    /// shape; the reference run must carry them. The folder appears when everything is in it.
     ///
     /// # Errors
     /// [`Error::StudyExists`] if there is anything at `folder`, and everything that [`Reference::of_run`] and
@@ -118,6 +123,7 @@ impl Study {
         folder: &Path,
         run: &Run,
         parts: &[String],
+        fields: &[Field],
         options: &BasisOptions,
         watch: &dyn Watch,
     ) -> Result<Self, Error> {
@@ -134,6 +140,9 @@ impl Study {
         // Can it be written at all? Better asked before the eigenbasis than after.
         drop(StagedFolder::beside(folder)?);
         let reference = Reference::of_run(run, parts)?;
+        if !run.times().is_empty() {
+            fields.iter().try_for_each(|field| run.field(*field, 0).map(drop))?;
+        }
         let joints = joints_of(run, &reference, options)?;
         let ties = joints.as_ref().map_or(Ok(Vec::new()), |joints| joints_file::ties(joints, &reference, run.id()))?;
         let mut basis = Basis::compute(&reference, &ties, options, watch)?;
@@ -144,6 +153,7 @@ impl Study {
             parts: reference.parts.clone(),
             eigenpairs: options.eigenpairs,
             join: options.join,
+            fields: fields.to_vec(),
             deck: run.deck().map(|deck| absolute(deck.path())),
             operator: "cotangent".into(),
             mass: "lumped".into(),
@@ -211,11 +221,11 @@ impl Study {
         &self.manifest
     }
 
-    /// Whether the study is what these wishes would make: the same surface, parts, eigenpairs and join.
+    /// Whether the study is what these wishes would make: the same surface, parts, fields, eigenpairs and join.
     ///
     /// # Errors
     /// Those of [`Reference::of_run`] and [`Study::reference`].
-    pub fn is_for(&self, run: &Run, parts: &[String], options: &BasisOptions) -> Result<bool, Error> {
+    pub fn is_for(&self, run: &Run, parts: &[String], fields: &[Field], options: &BasisOptions) -> Result<bool, Error> {
         let reference = Reference::of_run(run, parts)?;
         let same_mesh = || -> Result<bool, Error> {
             let here = self.reference()?;
@@ -225,9 +235,11 @@ impl Study {
         };
         Ok(self.settings.eigenpairs == options.eigenpairs
             && self.settings.join == options.join
+            && self.settings.fields == fields
             && self.settings.parts == reference.parts
             && same_mesh()?
-            && joints_of(run, &reference, options)?.map(|joints| joints.ties) == self.joints()?.map(|joints| joints.ties))
+            && joints_of(run, &reference, options)?.map(|joints| joints.ties)
+                == self.joints()?.map(|joints| joints.ties))
     }
 
     /// What the deck's welds and ties hold, in a study that was joined by a deck.

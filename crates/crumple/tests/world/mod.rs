@@ -15,6 +15,7 @@ use crumple::basis::BasisOptions;
 use crumple::bundle::{self, Found};
 use crumple::descriptor::{DescribeOptions, Described, Select, Threshold, describe};
 use crumple::run::Run;
+use crumple::select::Kind;
 use crumple::study::{AddOptions, Added, Loaded, Study};
 use crumple::target::Named;
 use proptest::test_runner::{Config, RngSeed};
@@ -371,7 +372,7 @@ impl World {
     /// A study of the mesh of one run, without runs.
     pub fn empty_study(&self, name: &str, reference: &str, eigenpairs: usize) -> Study {
         let options = BasisOptions { eigenpairs, join: None };
-        Study::create(&self.path(name), &self.open(reference), &[], &options, &()).unwrap()
+        Study::create(&self.path(name), &self.open(reference), &[], &[], &options, &()).unwrap()
     }
 
     /// A study of all runs, on the mesh of the first.
@@ -390,7 +391,14 @@ impl World {
 
 /// The descriptor of the last state of a run.
 pub fn described(loaded: &Loaded, run: &str, select: Select, threshold: Threshold) -> Described {
-    describe(loaded, &Named::parse(run), None, Some(run), &DescribeOptions { select, threshold }).unwrap()
+    describe(
+        loaded,
+        &Named::parse(run),
+        None,
+        Some(run),
+        &DescribeOptions { kind: Kind::Paper, select, threshold, ..Default::default() },
+    )
+    .unwrap()
 }
 
 // ---- numbers ------------------------------------------------------------------------------------------------------

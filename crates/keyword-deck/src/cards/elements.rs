@@ -80,12 +80,33 @@ impl Elements {
             }
             "SOLID" => {
                 known = &[
-                    "ORTHO", "DOF", "TET4TOTET10", "T4TOT10", "T4TOT15", "H20", "H27", "H64", "H8TOH20", "H8TOH27",
-                    "H8TOH64", "P21", "P40", "P6TOP21", "T15", "T20", "FORMAT2",
+                    "ORTHO",
+                    "DOF",
+                    "TET4TOTET10",
+                    "T4TOT10",
+                    "T4TOT15",
+                    "H20",
+                    "H27",
+                    "H64",
+                    "H8TOH20",
+                    "H8TOH27",
+                    "H8TOH64",
+                    "P21",
+                    "P40",
+                    "P6TOP21",
+                    "T15",
+                    "T20",
+                    "FORMAT2",
                 ];
-                for (option, cards, count) in
-                    [("H20", 2, 8), ("H27", 3, 8), ("H64", 7, 8), ("P21", 3, 6), ("P40", 4, 6), ("T15", 2, 4), ("T20", 2, 4)]
-                {
+                for (option, cards, count) in [
+                    ("H20", 2, 8),
+                    ("H27", 3, 8),
+                    ("H64", 7, 8),
+                    ("P21", 3, 6),
+                    ("P40", 4, 6),
+                    ("T15", 2, 4),
+                    ("T20", 2, 4),
+                ] {
                     if has(option) {
                         (node_cards, corners) = (cards, count);
                     }
@@ -99,9 +120,8 @@ impl Elements {
                 Kind::ThickShell
             }
             "BEAM" => {
-                known = &[
-                    "THICKNESS", "SCALAR", "SCALR", "SECTION", "PID", "OFFSET", "ORIENTATION", "WARPAGE", "ELBOW",
-                ];
+                known =
+                    &["THICKNESS", "SCALAR", "SCALR", "SECTION", "PID", "OFFSET", "ORIENTATION", "WARPAGE", "ELBOW"];
                 add(&mut extra, Next::Other, options.len());
                 Kind::Beam
             }
@@ -187,14 +207,7 @@ impl Elements {
         }
     }
 
-    fn suffix(
-        &mut self,
-        next: Next,
-        card: Card<'_>,
-        at: &At<'_>,
-        frame: &Frame,
-        deck: &mut Deck,
-    ) -> Result<(), Error> {
+    fn suffix(&mut self, next: Next, card: Card<'_>, at: &At<'_>, frame: &Frame, deck: &mut Deck) -> Result<(), Error> {
         match next {
             Next::Nodes => {
                 let row = card.row(EIGHTS, at);

@@ -73,7 +73,8 @@ impl Row<'_> {
         if id == 0 || offset == 0 {
             return Ok(id);
         }
-        id.checked_add_signed(offset).ok_or_else(|| self.wrong(index, name, "an id that stays positive with its offset"))
+        id.checked_add_signed(offset)
+            .ok_or_else(|| self.wrong(index, name, "an id that stays positive with its offset"))
     }
 }
 

@@ -26,7 +26,12 @@ pub(crate) fn kind(words: &[&str]) -> Option<SetKind> {
 }
 
 fn form(words: &[&str]) -> Option<Form> {
-    let rest: Vec<&str> = words.get(2..)?.iter().copied().filter(|word| !matches!(*word, "TITLE" | "COLLECT" | "LIST" | "SMOOTH")).collect();
+    let rest: Vec<&str> = words
+        .get(2..)?
+        .iter()
+        .copied()
+        .filter(|word| !matches!(*word, "TITLE" | "COLLECT" | "LIST" | "SMOOTH"))
+        .collect();
     Some(match rest[..] {
         [] => Form::List,
         ["COLUMN"] => Form::Column,
@@ -59,7 +64,8 @@ pub(crate) fn read(block: &Block<'_>, deck: &mut Deck) -> Result<bool, Error> {
             Form::Column => ids.push(row.moved(0, "ID", offset)?),
             Form::Generate => {
                 for pair in 0..4 {
-                    let (first, last) = (row.moved(2 * pair, "BBEG", offset)?, row.moved(2 * pair + 1, "BEND", offset)?);
+                    let (first, last) =
+                        (row.moved(2 * pair, "BBEG", offset)?, row.moved(2 * pair + 1, "BEND", offset)?);
                     if first != 0 {
                         clauses.push(Clause::Range { first, last: last.max(first), step: 1 });
                     }

@@ -34,18 +34,21 @@ const chartStyle = (width, height, more) => ({
 
 // ---- similarity --------------------------------------------------------------------------------------------------
 
-/** Runs from most to least similar to a mode's descriptor. */
-function ranking(mode) {
-  return runs.filter((run) => !missing(run.similarity?.[mode.name]))
-    .map((run) => ({ id: run.id, mode: run.mode, value: run.similarity[mode.name] }))
+/** The two kinds of similarity, in the order in which a run has them. */
+const KINDS = ["rotation spectrum", "the paper’s coefficients"];
+
+/** Runs from most to least similar to a mode's descriptor, by one kind. */
+function ranking(mode, kind) {
+  return runs.filter((run) => !missing(run.similarity?.[mode.name]?.[kind]))
+    .map((run) => ({ id: run.id, mode: run.mode, value: run.similarity[mode.name][kind] }))
     .sort((a, b) => b.value - a.value || d3.ascending(a.id, b.id))
     .map((row, index) => ({ ...row, rank: index + 1 }));
 }
 
-function similarityChart(mode, choose) {
-  const rows = ranking(mode), crowd = rows.length > 400 ? 2.2 : rows.length > 150 || (printing && rows.length > 40) ? 3 : 4;
+function similarityChart(mode, kind, choose) {
+  const rows = ranking(mode, kind), crowd = rows.length > 400 ? 2.2 : rows.length > 150 || (printing && rows.length > 40) ? 3 : 4;
   const medoid = rows.filter((row) => row.id === mode.medoid);
-  return chart(`Similarity of all runs to ${modeTitle(mode.name)}`, (width) => Plot.plot(chartStyle(width, Math.min(300, Math.max(210, width * 0.55)), {
+  return chart(`Similarity of all runs to ${modeTitle(mode.name)} by ${KINDS[kind]}`, (width) => Plot.plot(chartStyle(width, Math.min(300, Math.max(210, width * 0.55)), {
     x: { label: "runs, most similar first →", labelAnchor: "right", labelArrow: "none", domain: [0, rows.length + 1], ticks: Math.min(6, width / 80), tickFormat: (v) => (Number.isInteger(v) && v > 0 ? count(v) : "") },
     y: { label: "↑ similarity", labelArrow: "none", nice: true, ticks: 5, tickFormat: (v) => String(+v.toFixed(4)).replace("-", "−") },
     marks: [

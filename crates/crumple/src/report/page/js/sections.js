@@ -42,7 +42,7 @@ function modeCard(mode, showMode) {
     shapeView(original, { group: "cards", label: `${mode.medoid}, the typical run of ${modeTitle(mode.name)}` }),
     el("p", { class: "caption" }, "Typical run: ", runLink(mode.medoid)),
     mode.words ? el("p", { class: "words" }, mode.words) : null,
-    nearest.length ? [el("h4", { title: "By the descriptor of the typical run: where the part went. A mark shows a run that belongs to another mode." }, "Most like it"), el("ol", { class: "nearest" }, nearest.map((near) => el("li", {}, runLink(near.run, " "), runById.get(near.run)?.mode && runById.get(near.run).mode !== mode.name ? modeMark(runById.get(near.run).mode, 11) : null, el("span", {}, similarity(near.similarity)))))] : null,
+    nearest.length ? [el("h4", { title: "By the rotation spectrum of the typical run. A mark shows a run that belongs to another mode." }, "Most like it"), el("ol", { class: "nearest" }, nearest.map((near) => el("li", {}, runLink(near.run, " "), runById.get(near.run)?.mode && runById.get(near.run).mode !== mode.name ? modeMark(runById.get(near.run).mode, 11) : null, el("span", {}, similarity(near.similarity)))))] : null,
     el("h4", {}, members.length <= MEMBERS_SHOWN ? "All its runs" : `Its first ${MEMBERS_SHOWN} runs`),
     el("ul", { class: "members" }, members.slice(0, MEMBERS_SHOWN).map((id) => el("li", {}, runLink(id)))),
     members.length > MEMBERS_SHOWN ? el("button", { class: "more", type: "button", onclick: () => showMode(mode.name) }, `All ${count(members.length)} in the table`) : null);
@@ -76,7 +76,7 @@ function cloudSide() {
 /** What is known of a run, as terms and values. */
 function runFacts(run) {
   return [
-    ...modes.map((mode) => [`like ${modeTitle(mode.name)}`, run.similarity?.[mode.name], similarity]),
+    ...modes.map((mode) => [`like ${modeTitle(mode.name)}`, run.similarity?.[mode.name]?.[0], similarity]),
     ["largest displacement", run.max_displacement, (v) => withUnit(v)],
     ["states", run.times?.length ? run.times : null, (times) => `${count(run.states ?? times.length)}, to ${withUnit(times.at(-1), timeUnit)}`],
     ...inputs.map((name, c) => [inputTitle(name), run.inputs?.[c] || null, (v) => breakable(v)]),
@@ -89,16 +89,18 @@ function runFacts(run) {
 function similaritySection(choose) {
   const ranked = modes.filter((mode) => runs.some((run) => !missing(run.similarity?.[mode.name])));
   if (!ranked.length) return null;
-  return section("similarity", "How alike each run is", "One mark for each run, from most to least like the typical run (ringed); 1 is the same shape. The colour is the mode the run belongs to, so a clean front of one colour means that the typical run finds its own kind.",
+  return section("similarity", "How alike each run is", "One mark for each run, from most to least like the typical run (ringed). The colour is the mode the run belongs to, so a clean front of one colour means that the typical run finds its own kind.",
     el("div", { class: "legend" }, modes.map((mode) => el("span", {}, modeMark(mode.name, 12), modeTitle(mode.name)))),
-    el("div", { class: "columns" }, ranked.map((mode) => el("figure", {}, el("figcaption", {}, modeMark(mode.name), `Like ${modeTitle(mode.name)}`), similarityChart(mode, choose), nearestPictures(mode)))));
+    el("p", {}, "The rotation spectrum compares how the surface has turned, at which wavelengths and which way as a whole; a fold counts as the same fold wherever on the part it happens. The paper’s coefficients compare where every place of the part has gone, so the same fold elsewhere looks different."),
+    KINDS.map((name, kind) => [el("h3", {}, `By ${name}`),
+      el("div", { class: "columns" }, ranked.map((mode) => el("figure", {}, el("figcaption", {}, modeMark(mode.name), `Like ${modeTitle(mode.name)}`), similarityChart(mode, kind, choose), nearestPictures(mode, kind))))]));
 }
 
 /** The most similar runs as small shapes. */
-function nearestPictures(mode) {
-  const near = (mode.descriptor?.nearest ?? []).slice(0, NEAREST_SHOWN).filter(({ run }) => hasShape(`run:${run}`));
+function nearestPictures(mode, kind) {
+  const near = ((kind === 0 ? mode.descriptor?.nearest : mode.descriptor?.nearest_paper) ?? []).slice(0, NEAREST_SHOWN).filter(({ run }) => hasShape(`run:${run}`));
   if (!stage || !near.length) return null;
-  return el("div", { class: "thumbnails" }, near.map(({ run, similarity: value }) => el("div", {}, shapeView(`run:${run}`, { group: `near ${mode.name}`, label: run }), el("p", {}, runLink(run), ` ${similarity(value)}`))));
+  return el("div", { class: "thumbnails" }, near.map(({ run, similarity: value }) => el("div", {}, shapeView(`run:${run}`, { group: `near ${mode.name} ${kind}`, label: run }), el("p", {}, runLink(run), ` ${similarity(value)}`))));
 }
 
 // ---- reconstructions and spectrum ------------------------------------------------------------------------------------

@@ -60,7 +60,7 @@ const originalOf = (mode) => mode.descriptor?.shapes?.original ?? `run:${mode.me
 const originals = modes.map((mode) => originalOf(mode)).filter(hasShape);
 const anyShape = Object.keys(findings.shapes ?? {}).find(hasShape);
 // Pictures of the nearest runs share the frame, so they must fit into it.
-const nearestShapes = modes.flatMap((mode) => (mode.descriptor?.nearest ?? []).map((near) => `run:${near.run}`)).filter(hasShape);
+const nearestShapes = modes.flatMap((mode) => [...(mode.descriptor?.nearest ?? []), ...(mode.descriptor?.nearest_paper ?? [])].map((near) => `run:${near.run}`)).filter(hasShape);
 const framed = originals.length ? [...originals, ...nearestShapes] : anyShape ? [anyShape] : [];
 const frame = framed.length ? frameOf(framed, defaultDirection(referencePositions ?? positionsOf(framed[0]))) : null;
 

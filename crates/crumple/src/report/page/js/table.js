@@ -12,7 +12,7 @@ function tableColumns() {
   const columns = [
     { title: "run", value: (run) => run.id, show: (run) => runLink(run.id), fixed: true },
     { title: "mode", value: (run) => run.mode, fixed: true, show: (run) => [modeMark(run.mode, 12), ` ${modeTitle(run.mode)}`, run.outlier ? el("span", { class: "flag", title: "Unlike the rest of its mode" }, "outlier") : null] },
-    ...modes.map((mode) => numeric(["like ", modeTitle(mode.name)].join(""), `Similarity to the typical run of ${modeTitle(mode.name)}; 1 is the same`, (run) => run.similarity?.[mode.name], similarity)),
+    ...KINDS.flatMap((name, kind) => modes.map((mode) => numeric([kind ? "paper: like " : "like ", modeTitle(mode.name)].join(""), `Similarity to the typical run of ${modeTitle(mode.name)} by ${name}; 1 is the same`, (run) => run.similarity?.[mode.name]?.[kind], similarity))),
     plain("from typical run", "Distance to the typical run of its mode, over all coefficients", (run) => run.distance_to_medoid),
     numeric("silhouette", "1: surely in its mode; 0: between two modes; below 0: nearer to another mode", (run) => run.silhouette, columnFormat([0.99])),
     plain(`largest displacement${lengthUnit ? ` (${lengthUnit})` : ""}`, "The way of the vertex that moved furthest", (run) => run.max_displacement),
