@@ -157,9 +157,9 @@ fn a_study_keeps_what_joined_it_and_check_holds_it_true() {
     let world = World::new();
     let options = |join| BasisOptions { eigenpairs: 20, join };
     let run = world.deck("*SET_NODE_LIST\n1\n1001,1014,1040\n*CONTACT_TIED_NODES_TO_SURFACE\n1,1,4,3\n");
-    let apart = Study::create(&world.path("apart"), &run, &[], &options(None), &()).unwrap();
+    let apart = Study::create(&world.path("apart"), &run, &[], &[], &options(None), &()).unwrap();
     assert_eq!(apart.basis().unwrap().facts.null_space, 2);
-    let study = Study::create(&world.path("study"), &run, &[], &options(Some(Join::DECK)), &()).unwrap();
+    let study = Study::create(&world.path("study"), &run, &[], &[], &options(Some(Join::DECK)), &()).unwrap();
     let basis = study.basis().unwrap();
     assert_eq!((basis.facts.null_space, basis.facts.joined_pairs, basis.facts.followers), (1, 3, 2));
     assert_eq!(
@@ -175,10 +175,10 @@ fn a_study_keeps_what_joined_it_and_check_holds_it_true() {
             assert!((inner - f64::from(u8::from(i == j))).abs() < 1e-6, "{i}, {j}: {inner}");
         }
     }
-    assert!(study.is_for(&run, &[], &options(Some(Join::DECK))).unwrap());
-    assert!(!study.is_for(&run, &[], &options(Some(Join::Distance(2.0)))).unwrap());
+    assert!(study.is_for(&run, &[], &[], &options(Some(Join::DECK))).unwrap());
+    assert!(!study.is_for(&run, &[], &[], &options(Some(Join::Distance(2.0)))).unwrap());
     let other = world.deck("*SET_NODE_LIST\n1\n1001\n*CONTACT_TIED_NODES_TO_SURFACE\n1,1,4,3\n");
-    assert!(!study.is_for(&other, &[], &options(Some(Join::DECK))).unwrap(), "a deck that ties other nodes");
+    assert!(!study.is_for(&other, &[], &[], &options(Some(Join::DECK))).unwrap(), "a deck that ties other nodes");
     let whole = |name: &str| check(&world.path(name)).unwrap();
     assert!(whole("study").whole && whole("apart").whole);
     // Another tie than the basis was made with, under a checksum that says it is right.
@@ -219,11 +219,11 @@ fn a_deck_of_another_model_is_refused() {
     let with_other = Run::open("model", &world.path("model.k"))
         .unwrap()
         .with_deck(std::sync::Arc::new(crumple::deck::read(&other).unwrap()));
-    let error = Study::create(&world.path("study"), &with_other, &[], &options, &()).unwrap_err();
+    let error = Study::create(&world.path("study"), &with_other, &[], &[], &options, &()).unwrap_err();
     assert!(matches!(error, Error::OtherDeck { .. }) && error.remedy().is_some(), "{error}");
     assert!(!world.path("study").exists());
     // A deck has no states, and says so.
-    let mut study = Study::create(&world.path("study"), &run, &[], &options, &()).unwrap();
+    let mut study = Study::create(&world.path("study"), &run, &[], &[], &options, &()).unwrap();
     let found = crumple::bundle::find(&[world.path("model.k")]).unwrap();
     let error = study.add(&found, Default::default(), &()).unwrap_err();
     assert!(matches!(error, Error::NoStates { .. }), "{error}");
