@@ -273,7 +273,7 @@ fn functions(text: &str) -> Result<Vec<Function>, Error> {
 pub(crate) struct SimilarityArgs {
     /// Which of the descriptor's numbers: `rotation`, the spectrum of the rotation field, which finds a deformation
     /// wherever on the part it happens, or `paper`, coefficients on the eigenvectors that matter [default: what the
-    /// descriptor was made for]
+    /// descriptor was made for; paper with --metric euclidean and --weight frequency]
     #[arg(long, value_name = "KIND")]
     kind: Option<String>,
     /// Compare only the coefficients of these eigenvectors, as 3,5,8-12, in place of the descriptor's own (kind paper)

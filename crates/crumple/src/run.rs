@@ -337,6 +337,17 @@ impl Run {
         }
     }
 
+    /// Which shells are deleted in one state, in the order of [`Run::faces`]; `None` where the file does not tell.
+    ///
+    /// # Errors
+    /// [`Error::Read`] if the file cannot be read there.
+    pub fn deleted_shells(&self, state: usize) -> Result<Option<Vec<bool>>, Error> {
+        match &self.source {
+            Source::D3plot(family) => Ok(family.deleted_shells(state)?),
+            Source::Deck { .. } => Ok(None),
+        }
+    }
+
     /// A field in one state.
     ///
     /// # Errors

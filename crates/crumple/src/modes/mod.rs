@@ -49,7 +49,7 @@ pub const RUNS_MIN: usize = 3;
 /// The largest number of modes that is tried when none is given.
 pub const COUNT_MAX: usize = 8;
 /// Numbers of groups whose stability is within this of the best count as equally stable.
-const EQUALLY_STABLE: f64 = 0.02;
+const EQUALLY_STABLE: f64 = 0.01;
 /// Groups that come back worse than this are doubtful.
 pub const STABLE: f64 = 0.75;
 
