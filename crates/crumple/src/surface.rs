@@ -37,6 +37,8 @@ impl Surface {
         if path.is_dir() || mesh_files::format_of(path).is_none() {
             match Run::open(path.display().to_string(), path) {
                 Ok(run) => return Surface::of_run(&run, parts),
+                // A deck by its name, whose fault is known.
+                Err(error @ Error::Deck(_)) => return Err(error),
                 // Its first bytes may still say what it is.
                 Err(error) if path.is_dir() || has_the_name_of_a_run(path) => return Err(error),
                 Err(_) => {}

@@ -8,12 +8,12 @@
 //! |       | `vertex_mass` | N, diagonal, ≥ 0                      | ℓ²   |
 //!
 //! D degrees of freedom for N vertices: D = N, unless vertices are joined or tied to others ([`Tie`]), whose value they
-//! then have; `vertex_mass` is 0 where a vertex follows several.
+//! then have (`coupling.rs`); `vertex_mass` is 0 where a vertex follows several and M is diagonal.
 //! Weak form: L φ = λ M φ, so λ is in 1/ℓ² (a pure number with [`Mass::Identity`]). Sign: positive (libigl's
 //! `cotmatrix` is the negative of ours).
 //!
 //! `cotan`, `tufted` and `polygon` each turn the mesh into [`Elements`] on its vertices; here these become matrices on
-//! degrees of freedom.
+//! degrees of freedom, joins and ties in the same way whatever the discretisation and the mass.
 
 mod cotan;
 mod polygon;
@@ -80,12 +80,15 @@ pub enum Mass {
 pub struct Operator {
     /// L, D × D; for [`Kind::Cotan`] Lᵢⱼ = −½ Σ cot of the angles opposite to edge ij, Lᵢᵢ = −Σⱼ Lᵢⱼ.
     pub stiffness: Csr,
-    /// M's diagonal, D, ℓ²: a third of the area of each face at a degree of freedom. Where there is a `mass_matrix`, the
-    /// sums of its rows.
+    /// M's diagonal, D, ℓ²: a third of the area of each face at a degree of freedom; with [`Mass::Identity`] how many
+    /// vertices it stands for. Where there is a `mass_matrix`, the sums of its rows.
     pub mass: Vec<f64>,
-    /// N, ℓ²: the same per vertex, for M-products on vertices. Sums to the mesh's area, as `mass` does. A vertex that
-    /// follows several has 0 and they have its area.
+    /// N, ℓ²: the same per vertex, for M-products on vertices, with the sum of `mass`. A vertex that follows several has 0
+    /// and they have its share, unless there is a `vertex_mass_matrix`: then the sums of its rows.
     pub vertex_mass: Vec<f64>,
+    /// N, ℓ²: the surface's area, shared out among vertices as the lumped mass is, whatever M is. A vertex that follows
+    /// several has 0 and they have its area.
+    pub vertex_area: Vec<f64>,
     /// M, D × D, where it is not diagonal ([`Mass::Consistent`]).
     pub mass_matrix: Option<Csr>,
     /// The same on vertices, N × N, as if none followed another: with Φ's values on all vertices, Φᵀ M Φ = I.
@@ -138,6 +141,15 @@ pub enum OperatorError {
         vertex: usize,
         /// Its area, ℓ².
         mass: f64,
+    },
+    /// Each vertex of a piece of the mesh follows the same mean of places on separate pieces, which nothing else connects:
+    /// the piece then has no stiffness, and its mass, not being diagonal, couples what the stiffness does not.
+    #[error(
+        "vertex {vertex}: ties couple it by mass alone to a separate piece of the mesh; use the lumped mass, or leave these ties out"
+    )]
+    MassAcross {
+        /// A vertex on one of the separate pieces.
+        vertex: usize,
     },
     /// Edge flips do not come to an end, which only rounding can do.
     #[error(
@@ -214,7 +226,7 @@ impl Elements {
 /// Builds L and M. Time and memory O(T) but for the flips of [`Kind::Tufted`], of which a reasonable mesh needs O(T).
 ///
 /// # Errors
-/// A vertex without a triangle that has area; a join distance that is not usable; areas that overflow.
+/// A vertex without a triangle that has area; a join distance or ties that are not usable; areas that overflow.
 pub fn operator(mesh: &Mesh, options: &OperatorOptions) -> Result<Operator, OperatorError> {
     let &OperatorOptions { join: distance, ref ties, kind, mass: kind_of_mass } = options;
     let vertices = mesh.vertices().len();
@@ -239,24 +251,33 @@ pub fn operator(mesh: &Mesh, options: &OperatorOptions) -> Result<Operator, Oper
         });
     }
 
-    let (vertex_mass_matrix, mass_matrix) = if consistent {
-        let (pairs, diagonal) = reduction.mass(&mass_pairs, &mass_diagonal);
-        (Some(Csr::symmetric(&mass_pairs, mass_diagonal)), Some(Csr::symmetric(&pairs, diagonal)))
-    } else {
-        (None, None)
-    };
-    let each = if kind_of_mass == Mass::Identity { vec![1.0; vertices] } else { lumped };
-    let vertex_mass = reduction.vertex_mass(each);
-    let mut mass = vec![0.0; dofs];
-    reduction.dof_of_vertex.iter().zip(&vertex_mass).for_each(|(&dof, value)| mass[dof as usize] += value);
     let mut edges = reduction.edges(edges);
     let mut connected = Union::new(dofs);
     edges.iter().for_each(|&(i, j, _)| connected.merge(i, j));
     let (component_of_dof, components) = connected.classes();
+
+    let (vertex_mass_matrix, mass_matrix) = if consistent {
+        let (pairs, diagonal) = reduction.mass(&mass_pairs, &mass_diagonal);
+        let apart = |&&(i, j, _): &&(u32, u32, f64)| component_of_dof[i as usize] != component_of_dof[j as usize];
+        if let Some(&(dof, ..)) = pairs.iter().find(apart) {
+            return Err(OperatorError::MassAcross { vertex: reduction.vertex_of_dof()[dof as usize] as usize });
+        }
+        (Some(Csr::symmetric(&mass_pairs, mass_diagonal)), Some(Csr::symmetric(&pairs, diagonal)))
+    } else {
+        (None, None)
+    };
+    let vertex_area = reduction.vertex_mass(lumped.clone());
+    let shared = match kind_of_mass {
+        Mass::Lumped | Mass::Consistent => vertex_area.clone(),
+        Mass::Identity => reduction.vertex_mass(vec![1.0; vertices]),
+    };
+    let mut mass = vec![0.0; dofs];
+    reduction.dof_of_vertex.iter().zip(&shared).for_each(|(&dof, share)| mass[dof as usize] += share);
     Ok(Operator {
         stiffness: Csr::laplacian(dofs, &mut edges),
         mass,
-        vertex_mass,
+        vertex_mass: if consistent { lumped } else { shared },
+        vertex_area,
         mass_matrix,
         vertex_mass_matrix,
         vertex_of_dof: reduction.vertex_of_dof(),

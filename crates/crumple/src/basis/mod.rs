@@ -1,9 +1,12 @@
 //! The eigenbasis of the reference mesh, as a study keeps it, and what it is good for.
 //!
 //! L φ = λ M φ with cotangent stiffness L and lumped mass M, or another operator of `mesh-spectrum`, Φᵀ M Φ = I; the
-//! solver is there too. A study
-//! stores eigenvectors as f32, and everything is computed with the rounded ones, so that a run added later is
-//! projected on exactly the vectors of the first.
+//! solver is there too. A study stores eigenvectors as f32, and everything is computed with the rounded ones, so that a
+//! run added later is projected on exactly the vectors of the first.
+//!
+//! Two weights are kept apart, which only the lumped mass makes one. M is what coefficients are made with, so whatever is
+//! compared with coefficients (how much of a displacement they catch, the energy of a rotation field) is taken in M. What
+//! is told in lengths (root mean square displacements, errors of reconstructions) is a mean over the area of the surface.
 
 mod transform;
 
@@ -19,7 +22,7 @@ pub use transform::{coefficients, synthesize};
 use crate::Error;
 use crate::joints::Join;
 use crate::reference::Reference;
-use crate::vector::Vector;
+use crate::vector::{Vector, dot, square};
 
 /// What is asked of the eigenbasis.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,10 +52,14 @@ pub struct Basis {
     pub eigenvalues: Vec<f64>,
     /// Φ, K × N, one eigenvector after another, in 1/length.
     pub eigenvectors: Vec<f32>,
-    /// Lumped mass of each vertex, N, in length²; all 1 with the identity as mass.
+    /// M on vertices, N, diagonal: lumped areas in length², or with the identity as mass how many vertices each stands
+    /// for, 1 unless a deck ties others to it.
     pub mass: Vec<f64>,
     /// M on vertices, N × N, where it is not diagonal; then `mass` holds the sums of its rows.
     pub mass_matrix: Option<Csr>,
+    /// The surface's area, shared out among vertices, N, in length²; whatever M is. Means over the surface use it, and
+    /// products with Φ use M. With the lumped mass both are the same.
+    pub area: Vec<f64>,
     /// α⁰ = Φᵀ M p⁰, K × 3, in length².
     pub baseline: Vec<[f64; 3]>,
     /// What is known about it.
@@ -160,7 +167,7 @@ impl Basis {
             null_space: solved.certificate.components,
             join_advice: inspection.gap.filter(|_| join.is_none()),
             area: inspection.area,
-            length: length_of(reference.mesh.vertices(), &operator.vertex_mass),
+            length: length_of(reference.mesh.vertices(), &operator.vertex_area),
             non_manifold_edges: inspection.non_manifold_edges,
             flat_triangles: inspection.triangles_without_area,
             residual: solved.certificate.residual_max,
@@ -176,6 +183,7 @@ impl Basis {
             eigenvectors,
             mass: operator.vertex_mass,
             mass_matrix: operator.vertex_mass_matrix,
+            area: operator.vertex_area,
             baseline: Vec::new(),
             facts,
         };
@@ -191,6 +199,30 @@ impl Basis {
     /// Number of vertices N.
     pub fn vertices(&self) -> usize {
         self.mass.len()
+    }
+
+    /// ‖1‖²_M, the sum of all entries of M: the surface's area, or with the identity as mass the number of vertices.
+    /// What the squared norm of coefficients is divided by to make it a mean: Σ |Φᵀ M f|² / ‖1‖²_M is the mean square of
+    /// f in M, as far as K eigenvectors go.
+    pub fn total_mass(&self) -> f64 {
+        self.mass.iter().sum()
+    }
+
+    /// What eigenvalues are multiplied by to be in 1/length²: 1, and N / A for N vertices on the area A with the identity as
+    /// mass, whose eigenvalues are pure numbers (exact where all vertices have the same area).
+    pub(crate) fn per_square_length(&self) -> f64 {
+        if self.facts.mass == Mass::Identity.to_string() { self.total_mass() / self.facts.area } else { 1.0 }
+    }
+
+    /// ‖f‖²_M of a vector function on the vertices, N × 3: what the squares of all its coefficients sum to.
+    pub(crate) fn square_norm(&self, values: &[[f64; 3]]) -> f64 {
+        match self.mass_matrix {
+            Some(_) => {
+                let products = values.iter().zip(self.weigh(values)).map(|(f, w)| dot(*f, w));
+                products.sum::<f64>().max(0.0) // not below by rounding
+            }
+            None => values.iter().zip(&self.mass).map(|(f, m)| m * square(*f)).sum(),
+        }
     }
 
     /// M f for a vector function on the vertices, N × 3.
@@ -223,9 +255,9 @@ impl Basis {
 }
 
 /// √12 times the largest standard deviation of the surface along a line.
-fn length_of(vertices: &[Vector], mass: &[f64]) -> f64 {
-    let area: f64 = mass.iter().sum();
-    let mean = |of: &dyn Fn(&Vector) -> f64| vertices.iter().zip(mass).map(|(p, m)| m * of(p)).sum::<f64>() / area;
+fn length_of(vertices: &[Vector], areas: &[f64]) -> f64 {
+    let area: f64 = areas.iter().sum();
+    let mean = |of: &dyn Fn(&Vector) -> f64| vertices.iter().zip(areas).map(|(p, a)| a * of(p)).sum::<f64>() / area;
     let centre: Vector = std::array::from_fn(|c| mean(&|p| p[c]));
     let covariance = Mat::from_fn(3, 3, |a, b| mean(&|p| (p[a] - centre[a]) * (p[b] - centre[b])));
     let variances = covariance.self_adjoint_eigenvalues(Side::Lower).unwrap_or_default();

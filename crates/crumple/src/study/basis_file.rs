@@ -1,5 +1,6 @@
 //! The basis on disk: `basis.safetensors` with eigenvalues [K], eigenvectors [K, N], mass [N], baseline [K, 3]; where the
-//! mass is not diagonal also mass_indptr [N + 1], mass_indices, mass_data, which is SciPy's `csr_matrix`.
+//! mass is not diagonal also mass_indptr [N + 1], mass_indices, mass_data, which is SciPy's `csr_matrix`; where vertices'
+//! areas are not the mass also area [N].
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -41,6 +42,10 @@ pub(crate) fn write(basis: &Basis, path: &Path) -> Result<(), Error> {
         tensors.push(("mass_indices", view(Dtype::U32, vec![entries], &columns)?));
         tensors.push(("mass_data", view(Dtype::F64, vec![entries], &values)?));
     }
+    let area = f64_bytes(basis.area.iter());
+    if basis.area != basis.mass {
+        tensors.push(("area", view(Dtype::F64, vec![n], &area)?));
+    }
     let facts = serde_json::to_string(&basis.facts).map_err(|error| internal(error.to_string()))?;
     let metadata = HashMap::from([("facts".to_owned(), facts)]);
     let bytes = safetensors::serialize(tensors, Some(metadata)).map_err(|error| internal(error.to_string()))?;
@@ -80,12 +85,13 @@ pub(crate) fn read(path: &Path, id: &str) -> Result<Basis, Error> {
     };
     let eigenvalues = doubles("eigenvalues")?;
     let mass = doubles("mass")?;
+    let area = if tensors.names().contains(&"area") { doubles("area")? } else { mass.clone() };
     let baseline: Vec<[f64; 3]> = doubles("baseline")?.as_chunks().0.to_vec();
     let eigenvectors: Vec<f32> =
         tensor("eigenvectors", Dtype::F32)?.data().as_chunks().0.iter().map(|word| f32::from_le_bytes(*word)).collect();
     let facts: BasisFacts = facts;
     let finite = |values: &[f64]| values.iter().all(|x| x.is_finite());
-    let numbers = finite(&eigenvalues) && finite(&mass) && finite(baseline.as_flattened());
+    let numbers = finite(&eigenvalues) && finite(&mass) && finite(&area) && finite(baseline.as_flattened());
     if !numbers || !eigenvectors.iter().all(|x| x.is_finite()) {
         return Err(damaged("it holds values that are not numbers".into()));
     }
@@ -94,6 +100,7 @@ pub(crate) fn read(path: &Path, id: &str) -> Result<Basis, Error> {
         return Err(damaged("its facts do not fit its eigenvalues".into()));
     }
     if mass.is_empty()
+        || area.len() != mass.len()
         || eigenvectors.len() != eigenvalues.len() * mass.len()
         || baseline.len() != eigenvalues.len()
         || eigenvalues.is_empty()
@@ -129,7 +136,7 @@ pub(crate) fn read(path: &Path, id: &str) -> Result<Basis, Error> {
     } else {
         None
     };
-    Ok(Basis { id: id.to_owned(), eigenvalues, eigenvectors, mass, mass_matrix, baseline, facts })
+    Ok(Basis { id: id.to_owned(), eigenvalues, eigenvectors, mass, mass_matrix, area, baseline, facts })
 }
 
 fn f64_bytes<'a>(values: impl Iterator<Item = &'a f64>) -> Vec<u8> {

@@ -161,7 +161,9 @@ impl Progress<'_> {
 /// is not interrupted).
 pub fn eigenbasis(operator: &Operator, options: &EigenOptions, watch: &dyn Watch) -> Result<Eigenbasis, EigenError> {
     if let Some(mass) = &operator.mass_matrix {
-        return general::eigenbasis(operator, mass, options, watch);
+        let mut basis = general::eigenbasis(operator, mass, options, watch)?;
+        operator.fill_followers(&mut basis.eigenvectors);
+        return Ok(basis);
     }
     let &EigenOptions { count: _, tolerance, seed, dense_below } = options;
     let count = check(options)?.min(operator.mass.len());

@@ -92,7 +92,9 @@ impl Pencil {
         self.dofs.len()
     }
 
-    /// An upper bound of the largest eigenvalue: Gershgorin's of A, over the smallest of B, ¼.
+    /// An upper bound of the largest eigenvalue: Gershgorin's of A, over the smallest of B, ¼. Where vertices follow several,
+    /// B may have smaller ones; no search comes that far up, because a component of which nearly all pairs are wanted is
+    /// solved dense.
     pub(super) fn norm(&self) -> f64 {
         4.0 * crate::eigen::slice::norm(&self.a)
     }
