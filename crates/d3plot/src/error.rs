@@ -1,4 +1,4 @@
-//! Why a family cannot be read: what is wrong, where, what was expected, and what to do about it.
+//! Why a family cannot be read or written: what is wrong, where, what was expected, and what to do about it.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -152,6 +152,20 @@ pub enum Error {
         /// Bytes found now.
         found: u64,
     },
+    /// A family that is to be written would overwrite a file, or take one of another run for its own.
+    #[error("{path}: already there; nothing is overwritten")]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// What is to be written does not fit the format, or what was said about the family before.
+    #[error("{path}: cannot be written: {what}")]
+    Content {
+        /// The file that was to be written.
+        path: PathBuf,
+        /// What is wrong, and what was expected.
+        what: String,
+    },
     /// The operating system refused.
     #[error("{path}: {action}: {source}")]
     Io {
@@ -193,6 +207,8 @@ impl Error {
             Error::NoSuchState { states, .. } => format!("ask for a state from 0 to {}", states - 1),
             Error::Layer { .. } => "ask for the maximum, minimum or mean, or for all points".to_owned(),
             Error::Changed { .. } => "open the family again when nothing writes to it any more".to_owned(),
+            Error::Exists { .. } => "name another file or folder, or remove the old family first".to_owned(),
+            Error::Content { .. } => return None,
             Error::Io { source, .. } => match source.kind() {
                 io::ErrorKind::PermissionDenied => "ask for the right to read it".to_owned(),
                 _ => return None,
@@ -217,6 +233,8 @@ impl Error {
             | Error::NoSuchState { path, .. }
             | Error::Layer { path, .. }
             | Error::Changed { path, .. }
+            | Error::Exists { path }
+            | Error::Content { path, .. }
             | Error::Io { path, .. } => path,
         }
     }

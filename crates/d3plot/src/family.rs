@@ -10,6 +10,7 @@ use crate::error::Error;
 use crate::geometry::{Reading, read_geometry};
 use crate::members::{Stream, member_number};
 use crate::parts::{Part, assemble};
+use crate::quantity::{Quantity, quantities};
 use crate::rigid::uncertain_rigid_bodies;
 use crate::roots::roots;
 use crate::state::{Field, Layout, Variant};
@@ -41,6 +42,8 @@ pub struct Family {
     pub(crate) control: Control,
     pub(crate) reading: Reading,
     pub(crate) layout: Layout,
+    /// What the words of the elements are.
+    pub(crate) quantities: Vec<Quantity>,
     /// Byte of the stream at which each state starts.
     pub(crate) starts: Vec<u64>,
     header: Header,
@@ -104,7 +107,8 @@ impl Family {
             members[stream.member_at(start)].states += 1;
         }
         let header = header(&control, &titles, &layout);
-        Ok(Family { stream, control, reading, layout, starts, header, parts, times, members, warnings })
+        let quantities = quantities(&control);
+        Ok(Family { stream, control, reading, layout, quantities, starts, header, parts, times, members, warnings })
     }
 
     /// The root file.

@@ -17,23 +17,27 @@ use crate::rigid::{Rigid, rigid_bodies, uncertain_rigid_bodies};
 pub(crate) const END_MARK: f64 = -999_999.0;
 
 /// The geometry and what its sections say about the states.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Reading {
     pub(crate) geometry: Geometry,
     /// Part numbers by internal order.
     pub(crate) part_ids: Option<Vec<u64>>,
     /// Whether the numbering repeats the counts of the control block (or there is none).
     pub(crate) numbers_agree: bool,
+    /// Numbers of the material models of the parts; empty where the file does not tell.
+    pub(crate) material_types: Vec<i64>,
     /// NUMRBE: shells without words in the states.
     pub(crate) rigid_shells: u64,
-    /// Words an SPH particle has in a state.
+    /// Lengths of what an SPH particle has in a state, the length of their list first.
+    pub(crate) sph_flags: Vec<i64>,
+    /// Words an SPH particle has in a state: one for its part and as many as the flags add up to.
     pub(crate) sph_words: u64,
     pub(crate) airbags: Airbags,
     /// NDIM 8, 9: the nodes, from 0, that the nodal blocks hold.
     pub(crate) active: Option<Vec<u32>>,
     pub(crate) rigid_bodies: u64,
     /// NDIM 8, 9: every node is either in a rigid body or active.
-    rigid_and_active_are_all: bool,
+    pub(crate) rigid_and_active_are_all: bool,
     pub(crate) road_surfaces: u64,
     /// Byte of the stream behind the last section.
     pub(crate) end: u64,
@@ -126,7 +130,7 @@ fn read_sections(control: &Control, stream: &Stream, choice: Choice, cursor: &mu
         types = cursor.ints(count, "material types")?;
     }
     cursor.skip(control.fluid_parts, 1, "fluid parts")?;
-    let sph_words = if control.sph > 0 { sph_words(cursor)? } else { 0 };
+    let sph_flags = if control.sph > 0 { sph_flags(cursor)? } else { Vec::new() };
     let airbags = read_airbags(control, cursor)?;
 
     let mut geometry = Geometry { coordinates: coordinates(control, cursor)?, ..Geometry::default() };
@@ -159,8 +163,10 @@ fn read_sections(control: &Control, stream: &Stream, choice: Choice, cursor: &mu
         geometry,
         part_ids: parts,
         numbers_agree: agree,
+        material_types: types,
         rigid_shells,
-        sph_words,
+        sph_words: sph_words(&sph_flags),
+        sph_flags,
         airbags,
         active: rigid.active,
         rigid_bodies: rigid.bodies,
@@ -171,20 +177,28 @@ fn read_sections(control: &Control, stream: &Stream, choice: Choice, cursor: &mu
     })
 }
 
-/// Words an SPH particle has in a state: one for its part and as many as the flags add up to. The first flag is the
-/// length of their list, 10 or 11 by the manuals.
-fn sph_words(cursor: &mut Cursor) -> Result<u64, Error> {
+/// The list of flags of SPH particles. The first is the length of the list, 10 or 11 by the manuals.
+fn sph_flags(cursor: &mut Cursor) -> Result<Vec<i64>, Error> {
     let start = cursor.at();
     let length = cursor.count("SPH flags")?;
     if !(1..=64).contains(&length) {
         return Err(cursor.wrong("SPH flags", start, format!("a list of {length} flags"), "10 or 11 flags".to_owned()));
     }
-    let flags = cursor.ints(length - 1, "SPH flags")?;
-    let words = flags.iter().fold(1_u64, |sum, flag| sum.saturating_add(flag.unsigned_abs()));
+    let mut flags = vec![length as i64];
+    flags.extend(cursor.ints(length - 1, "SPH flags")?);
+    let words = sph_words(&flags);
     if words > 1000 {
         return Err(cursor.wrong("SPH flags", start, format!("{words} words a particle"), "at most 1000".to_owned()));
     }
-    Ok(words)
+    Ok(flags)
+}
+
+/// One word for the part of a particle and as many as the flags behind the first add up to.
+pub(crate) fn sph_words(flags: &[i64]) -> u64 {
+    match flags {
+        [] => 0,
+        [_, lengths @ ..] => lengths.iter().fold(1_u64, |sum, flag| sum.saturating_add(flag.unsigned_abs())),
+    }
 }
 
 fn coordinates(control: &Control, cursor: &mut Cursor) -> Result<Vec<[f64; 3]>, Error> {

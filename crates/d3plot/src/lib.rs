@@ -41,6 +41,7 @@ mod rigid;
 mod titles;
 
 // the states
+mod quantity;
 mod results;
 mod state;
 mod strain;
@@ -49,6 +50,7 @@ mod walk;
 // the family
 mod family;
 mod roots;
+mod write;
 
 pub use control::Header;
 pub use detect::FileType;
@@ -62,3 +64,4 @@ pub use state::Field;
 pub use strain::Layers;
 pub use warning::Warning;
 pub use words::{ByteOrder, Precision};
+pub use write::{Content, DeletionTable, Positions, StateWriter, Stored, Thermal, WordsEach, WriteOptions, Writer};

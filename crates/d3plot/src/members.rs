@@ -226,7 +226,7 @@ pub(crate) fn files_in(folder: &Path, wanted: impl Fn(&[u8]) -> bool) -> Result<
 }
 
 /// The folder of a file, for listing.
-fn folder_of(path: &Path) -> &Path {
+pub(crate) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 

@@ -19,6 +19,9 @@ pub struct Part {
     pub title: String,
     /// The title as it is in the file, in whatever encoding the pre-processor used, without blanks at its end.
     pub title_bytes: Vec<u8>,
+    /// Number of its material model in the solver (20 is rigid), where the file tells: only files that leave the results
+    /// of rigid shells out do (NDIM 5, 7).
+    pub material: Option<u64>,
     /// Solids in it.
     pub solids: usize,
     /// Thick shells in it.
@@ -32,6 +35,11 @@ pub struct Part {
 }
 
 impl Part {
+    /// A part for a family that is to be written: its number in the deck and its title, of which the file keeps 72 bytes.
+    pub fn new(id: u64, title: &str) -> Part {
+        Part { id, title: title.to_owned(), title_bytes: title.as_bytes().to_vec(), ..Part::default() }
+    }
+
     /// Whether any element belongs to it. Nodal rigid bodies and parts left out of the output do not have any.
     pub fn is_used(&self) -> bool {
         self.solids + self.thick_shells + self.beams + self.shells + self.sph > 0
@@ -61,6 +69,7 @@ pub(crate) fn assemble(
         let title = if by_place { Some(titles.parts[index].1.as_slice()) } else { by_id.get(&part.id).copied() };
         part.title_bytes = trim_end(title.unwrap_or_default()).to_vec();
         part.title = decode_text(&part.title_bytes);
+        part.material = reading.material_types.get(index).and_then(|&number| u64::try_from(number).ok());
     }
 
     let geometry = &reading.geometry;
