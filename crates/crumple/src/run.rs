@@ -13,6 +13,7 @@ use crate::Error;
 pub struct Run {
     id: String,
     path: PathBuf,
+    node_ids: Vec<u64>,
     source: Source,
 }
 
@@ -123,7 +124,8 @@ impl Run {
     /// [`Error::Read`] if it is no readable result file.
     pub fn open(id: impl Into<String>, path: &Path) -> Result<Self, Error> {
         let family = d3plot::Family::open(path)?;
-        Ok(Self { id: id.into(), path: family.root().to_owned(), source: Source::D3plot(Box::new(family)) })
+        let node_ids = (0..family.header().nodes).map(|node| family.geometry().node_id(node)).collect();
+        Ok(Self { id: id.into(), path: family.root().to_owned(), node_ids, source: Source::D3plot(Box::new(family)) })
     }
 
     /// The run's id.
@@ -150,8 +152,7 @@ impl Run {
 
     /// User ids of the nodes.
     pub fn node_ids(&self) -> &[u64] {
-        let Source::D3plot(family) = &self.source;
-        &family.geometry().node_ids
+        &self.node_ids
     }
 
     /// Undeformed node positions, nodes × 3, in the model's length unit.

@@ -10,6 +10,11 @@ use crate::error::{Error, LooksLike};
 use crate::members::Stream;
 use crate::words::{ByteOrder, Precision, Words, decode_text, trim_end};
 
+/// Parts beyond a few are believed only where the files have this many words for each: a part has a title of 72 bytes,
+/// three numbers, and elements.
+const WORDS_OF_A_PART: u64 = 64;
+const FEW_PARTS: u64 = 2048;
+
 /// What NCFDV1 holds when several solvers wrote into one file.
 const MULTI_SOLVER: i64 = 67_108_864;
 
@@ -66,6 +71,8 @@ pub(crate) struct Control {
     pub(crate) fluid_parts: u64,
     pub(crate) adapted: u64,
     pub(crate) parts: u64,
+    /// More parts than this the files cannot hold.
+    pub(crate) most_parts: u64,
     /// Parts of solids, beams, shells, SPH, thick shells.
     pub(crate) parts_of_kind: [u64; 5],
     pub(crate) idtdt: i64,
@@ -149,6 +156,11 @@ impl Control {
             0 => parts_of_kind.iter().fold(0_u64, |sum, of| sum.saturating_add(*of)).min(most.unsigned_abs()),
             count => count,
         };
+        // a part needs a title and a number in the file; no more than the file can have are believed
+        let most_parts = (most.unsigned_abs() / WORDS_OF_A_PART).max(FEW_PARTS);
+        if parts > most_parts {
+            return Err(word.wrong("NMMAT", 51, &format!("0 to {most_parts}, for files of this size,")));
+        }
         let written = |at: usize, by: &[i64]| by.contains(&word.int(at));
         let release = trim_end(&head[13 * size as usize..13 * size as usize + 4]);
         Ok(Control {
@@ -194,6 +206,7 @@ impl Control {
             fluid_parts: word.count("IALEMAT", 47)?,
             adapted: word.count("NADAPT", 50)?,
             parts,
+            most_parts,
             parts_of_kind,
             idtdt: word.within("IDTDT", 56, 0, i32::MAX.into())?,
             extra,

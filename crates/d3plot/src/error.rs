@@ -132,6 +132,18 @@ pub enum Error {
         /// States there are.
         states: usize,
     },
+    /// A row that a field does not have.
+    #[error("{path}: row {row} (counted from 0) of '{field}' asked for, it has {rows}")]
+    NoSuchRow {
+        /// The root.
+        path: PathBuf,
+        /// The field.
+        field: &'static str,
+        /// The row asked for, from 0.
+        row: u64,
+        /// Rows there are.
+        rows: u64,
+    },
     /// A named layer that the states do not have.
     #[error("{path}: {what} asked for, but with {layers} points an element the file does not say which point that is")]
     Layer {
@@ -205,6 +217,7 @@ impl Error {
                 "the family has no whole state; was the run stopped early?".to_owned()
             }
             Error::NoSuchState { states, .. } => format!("ask for a state from 0 to {}", states - 1),
+            Error::NoSuchRow { .. } => "ask for nodes and elements of this family's geometry".to_owned(),
             Error::Layer { .. } => "ask for the maximum, minimum or mean, or for all points".to_owned(),
             Error::Changed { .. } => "open the family again when nothing writes to it any more".to_owned(),
             Error::Exists { .. } => "name another file or folder, or remove the old family first".to_owned(),
@@ -231,6 +244,7 @@ impl Error {
             | Error::Count { path, .. }
             | Error::Geometry { path, .. }
             | Error::NoSuchState { path, .. }
+            | Error::NoSuchRow { path, .. }
             | Error::Layer { path, .. }
             | Error::Changed { path, .. }
             | Error::Exists { path }

@@ -4,7 +4,9 @@ use std::collections::{BTreeSet, HashMap};
 
 use crate::control::Control;
 use crate::elements::Geometry;
+use crate::error::Error;
 use crate::geometry::Reading;
+use crate::members::Stream;
 use crate::titles::Titles;
 use crate::warning::Warning;
 use crate::words::{decode_text, trim_end};
@@ -52,10 +54,20 @@ pub(crate) fn assemble(
     control: &Control,
     reading: &mut Reading,
     titles: &Titles,
+    stream: &Stream,
     warnings: &mut Vec<Warning>,
-) -> Vec<Part> {
+) -> Result<Vec<Part>, Error> {
     let counted = control.parts as usize;
-    add_missing(&mut reading.geometry, counted, warnings);
+    let added = add_missing(&mut reading.geometry, counted, warnings);
+    if (counted + added) as u64 > control.most_parts {
+        return Err(Error::Geometry {
+            path: stream.root().to_owned(),
+            section: "parts of the elements",
+            offset: 0,
+            found: format!("{added} parts beyond the {counted} of the control block"),
+            expected: format!("at most {}, for files of this size,", control.most_parts),
+        });
+    }
     let ids = reading.part_ids.as_deref().unwrap_or_default();
     let most = part_indices(&mut reading.geometry).map(|part| *part as usize + 1).max().unwrap_or(0);
     let mut parts: Vec<Part> = (0..counted.max(most))
@@ -78,16 +90,16 @@ pub(crate) fn assemble(
     geometry.beams.iter().for_each(|beam| parts[beam.part as usize].beams += 1);
     geometry.shells.iter().for_each(|shell| parts[shell.part as usize].shells += 1);
     geometry.sph.iter().for_each(|particle| parts[particle.part as usize].sph += 1);
-    parts
+    Ok(parts)
 }
 
 /// A part number is a word of the file and may be anything up to 2³²: the numbers beyond the count become the next
 /// free places, so that no list is as long as such a number.
-fn add_missing(geometry: &mut Geometry, counted: usize, warnings: &mut Vec<Warning>) {
+fn add_missing(geometry: &mut Geometry, counted: usize, warnings: &mut Vec<Warning>) -> usize {
     let beyond: BTreeSet<u32> =
         part_indices(geometry).map(|part| *part).filter(|&part| part as usize >= counted).collect();
     if beyond.is_empty() {
-        return;
+        return 0;
     }
     let places: HashMap<u32, u32> = beyond.iter().copied().zip(counted as u32..).collect();
     for part in part_indices(geometry) {
@@ -96,6 +108,7 @@ fn add_missing(geometry: &mut Geometry, counted: usize, warnings: &mut Vec<Warni
         }
     }
     warnings.push(Warning::PartsBeyondCount { count: beyond.len() });
+    beyond.len()
 }
 
 /// The part of every element of every kind.

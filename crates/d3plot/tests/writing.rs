@@ -175,7 +175,7 @@ fn families_of_testdata_survive_being_written_again() {
         copy(&family, &root, &options);
         let again = Family::open(&root).unwrap();
         assert_eq!(again.warnings(), if family.times().is_empty() { &[Warning::NoStates][..] } else { &[] });
-        assert_eq!(again.geometry(), family.geometry(), "{}", folder.display());
+        assert_eq!(again.geometry(), &numbered(family.geometry()), "{}", folder.display());
         assert_eq!(again.times(), family.times());
         let facts = |part: &Part| (part.id, part.title.clone(), part.material, part.shells, part.solids);
         assert!(again.parts().iter().map(facts).eq(family.parts().iter().map(facts)), "{}", folder.display());
@@ -201,6 +201,22 @@ fn families_of_testdata_survive_being_written_again() {
         copied += 1;
     }
     assert!(copied >= 24, "{copied}");
+}
+
+/// A written family always has user numbers.
+fn numbered(geometry: &Geometry) -> Geometry {
+    let mut geometry = geometry.clone();
+    let count = |ids: &mut Vec<u64>, count: usize| {
+        if ids.is_empty() {
+            *ids = (1..=count as u64).collect();
+        }
+    };
+    count(&mut geometry.node_ids, geometry.coordinates.len());
+    count(&mut geometry.shell_ids, geometry.shells.len());
+    count(&mut geometry.solid_ids, geometry.solids.len());
+    count(&mut geometry.thick_shell_ids, geometry.thick_shells.len());
+    count(&mut geometry.beam_ids, geometry.beams.len());
+    geometry
 }
 
 /// Equal bits are equal numbers, NaN too.
