@@ -17,6 +17,7 @@ use crate::field::{Field, Layer, Quantity};
 pub struct Run {
     id: String,
     path: PathBuf,
+    node_ids: Vec<u64>,
     source: Source,
     /// Titles and welds: the deck itself, or one that belongs to the result file.
     deck: Option<Arc<Deck>>,
@@ -146,11 +147,13 @@ impl Run {
         if deck::is_deck(path) {
             let deck = Arc::new(deck::read(path)?);
             let source = Source::Deck { deck: Arc::clone(&deck), surface: Surface::of(&deck) };
-            return Ok(Self { id: id.into(), path: path.to_owned(), source, deck: Some(deck) });
+            let node_ids = deck.node_ids.clone();
+            return Ok(Self { id: id.into(), path: path.to_owned(), node_ids, source, deck: Some(deck) });
         }
         let family = d3plot::Family::open(path)?;
+        let node_ids = (0..family.header().nodes).map(|node| family.geometry().node_id(node)).collect();
         let path = family.root().to_owned();
-        Ok(Self { id: id.into(), path, source: Source::D3plot(Box::new(family)), deck: None })
+        Ok(Self { id: id.into(), path, node_ids, source: Source::D3plot(Box::new(family)), deck: None })
     }
 
     /// The same run with the titles and welds of a deck.
@@ -198,10 +201,7 @@ impl Run {
 
     /// User ids of the nodes.
     pub fn node_ids(&self) -> &[u64] {
-        match &self.source {
-            Source::D3plot(family) => &family.geometry().node_ids,
-            Source::Deck { deck, .. } => &deck.node_ids,
-        }
+        &self.node_ids
     }
 
     /// Undeformed node positions, nodes × 3, in the model's length unit.
