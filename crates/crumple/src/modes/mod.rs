@@ -156,6 +156,11 @@ pub fn modes(study: &Study, options: &ModesOptions, watch: &dyn Watch) -> Result
         let have = study.manifest().runs.len();
         return Err(Error::TooFewRuns { what: "grouping into modes", needed: RUNS_MIN, have });
     }
+    if let By::Field(field) = options.by
+        && !study.settings().fields.contains(&field)
+    {
+        return Err(crate::target::unknown_field(field, study.settings().fields.iter().copied()));
+    }
     let sampled = states::sample(study, options.by, &options.states, total_mass)?;
     let runs = sampled.runs.len();
     if runs < RUNS_MIN {
@@ -280,7 +285,7 @@ impl Modes {
     /// Unit of distances and spreads; empty where they have none.
     pub fn unit<'a>(&self, length_unit: &'a str) -> &'a str {
         match self.by {
-            By::Rotation => "",
+            By::Rotation | By::Field(_) => "",
             By::Displacement | By::Coordinates => length_unit,
         }
     }
