@@ -62,7 +62,7 @@ mod tests {
 
     #[test]
     fn what_exporters_write() {
-        let text = b"# caf\xe9\nmtllib a.mtl\no part\nv 0 0 0 1.0\r\nv 1 0 0 0.5 0.5 0.5\nvn 0 0 1\nv 1e0 1 0\nv 0 1 0\nf 1/1/1 2//1 3/3 \\\n 4\nf -4 -3 -2\nl 1 2\n";
+        let text = b"# \xe9\nmtllib a.mtl\no part\nv 0 0 0 1.0\r\nv 1 0 0 0.5 0.5 0.5\nvn 0 0 1\nv 1e0 1 0\nv 0 1 0\nf 1/1/1 2//1 3/3 \\\n 4\nf -4 -3 -2\nl 1 2\n";
         let mesh = parse(text).unwrap();
         assert_eq!(mesh.vertices, [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]]);
         assert_eq!(mesh.faces().collect::<Vec<_>>(), [&[0u32, 1, 2, 3][..], &[0, 1, 2]]);

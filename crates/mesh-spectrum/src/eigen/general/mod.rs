@@ -3,8 +3,8 @@
 //! The mass cannot be scaled out here, so every inner product is an M-product. The path is the plain one: inertia counts
 //! cut the spectrum of each connected component into intervals (`pencil`); each interval's pairs come from a shift-invert
 //! block Lanczos run of its own with full reorthogonalisation and the library's solves (`krylov`); `finish` makes all of
-//! them M-orthonormal and measures them. Correct first: it takes 4 to 8 times as long as the solver for diagonal mass
-//! (docs/operators.md has the figures).
+//! them M-orthonormal and measures them. Correct first: it takes several times as long as the solver for diagonal mass
+//! (docs/operators.md).
 
 mod finish;
 mod krylov;
