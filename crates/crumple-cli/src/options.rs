@@ -15,6 +15,30 @@ use crumple::modes::{Along, ModesOptions, States};
 use crumple::run::Run;
 use crumple::similarity::SimilarityOptions;
 use crumple::study::{Function, Loaded, Rows};
+use crumple::{Kind, Mass, UnknownName};
+
+/// The operator.
+#[derive(Args)]
+pub(crate) struct OperatorArgs {
+    /// Discretisation of the Laplacian: cotan, tufted (any faces, no negative weights; for meshes that are non-manifold
+    /// or badly shaped) or polygon (quads without choosing a diagonal) [default: cotan]
+    #[arg(long, value_name = "OPERATOR")]
+    operator: Option<String>,
+    /// Mass matrix: lumped (a third of each triangle's area to each corner), consistent (not diagonal; slower) or
+    /// identity (every vertex the same, as the paper's formula has it) [default: lumped]
+    #[arg(long, value_name = "MASS")]
+    mass: Option<String>,
+}
+
+impl OperatorArgs {
+    pub(crate) fn kinds(&self) -> Result<(Kind, Mass), Error> {
+        let wrong =
+            |name| move |error: UnknownName| Error::Value { name, value: error.name, expected: error.expected.into() };
+        let kind = self.operator.as_deref().map(str::parse).transpose().map_err(wrong("--operator"))?;
+        let mass = self.mass.as_deref().map(str::parse).transpose().map_err(wrong("--mass"))?;
+        Ok((kind.unwrap_or_default(), mass.unwrap_or_default()))
+    }
+}
 
 /// The surface and its eigenbasis.
 #[derive(Args)]
@@ -22,6 +46,8 @@ pub(crate) struct BasisArgs {
     /// Part whose shells make the surface, by id or title; may be given several times [default: all shells]
     #[arg(long = "part", value_name = "PART")]
     pub(crate) parts: Vec<String>,
+    #[command(flatten)]
+    operator: OperatorArgs,
     /// Quantity of the result files to project beside the shape: plastic_strain, temperature, velocity, acceleration;
     /// plastic_strain:outer (max, min, mean, inner, outer) for one layer of shells; may be given several times
     #[arg(long = "field", value_name = "FIELD")]
@@ -59,7 +85,8 @@ impl BasisArgs {
                 expected: "a distance in the model's length unit, or the word deck".into(),
             })?)),
         };
-        Ok(BasisOptions { eigenpairs: self.eigenpairs.unwrap_or(default.eigenpairs), join })
+        let (kind, mass) = self.operator.kinds()?;
+        Ok(BasisOptions { eigenpairs: self.eigenpairs.unwrap_or(default.eigenpairs), join, kind, mass })
     }
 
     /// The reference run with its deck: the one given, or `known` (a study's own).

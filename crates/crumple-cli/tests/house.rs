@@ -15,8 +15,9 @@ use world::{Own, folder, repository};
 const MAY_USE: &[(&str, &[&str])] = &[
     ("d3plot", &[]),
     ("keyword-deck", &[]),
+    ("mesh-files", &[]),
     ("mesh-spectrum", &[]),
-    ("crumple", &["d3plot", "keyword-deck", "mesh-spectrum"]),
+    ("crumple", &["d3plot", "keyword-deck", "mesh-files", "mesh-spectrum"]),
     ("crumple-cli", &["crumple"]),
     ("structures", &[]),
 ];
@@ -31,12 +32,14 @@ const STAGES: &[&str] = &[
     "bundle",
     "inputs",
     "reference",
+    "surface",
     "joints",
     "basis",
     "select",
     "rotation",
     "project",
     "study",
+    "eigen",
     "target",
     "modes",
     "reconstruct",
@@ -61,8 +64,10 @@ fn dependence_runs_one_way() {
     for package in metadata.packages {
         let allowed = ours(&package.name).expect("a new crate: give it its place in MAY_USE");
         for used in package.dependencies.iter().filter(|used| ours(&used.name).is_some()) {
+            // Tests and examples of mesh-spectrum start from files; the library never sees one.
+            let in_tests = used.kind == DependencyKind::Development && used.name == "mesh-files";
             assert!(
-                allowed.contains(&used.name.as_str()),
+                in_tests || allowed.contains(&used.name.as_str()),
                 "{} must not know {}: pass a value instead",
                 package.name,
                 used.name
@@ -138,7 +143,7 @@ fn every_file_says_what_it_is_for() {
 
 #[test]
 fn libraries_print_nothing_and_end_nothing() {
-    for library in ["d3plot", "keyword-deck", "mesh-spectrum", "crumple"] {
+    for library in ["d3plot", "keyword-deck", "mesh-files", "mesh-spectrum", "crumple"] {
         for path in rust_files(&repository().join("crates").join(library).join("src")) {
             let code = code(&path);
             for word in ["println!", "eprintln!", "print!(", "dbg!", "todo!", "unimplemented!", "process::exit"] {
@@ -183,6 +188,7 @@ fn every_command_is_there() {
     let expected = [
         "analyze",
         "info",
+        "eigen",
         "init",
         "add",
         "modes",

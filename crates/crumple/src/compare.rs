@@ -144,7 +144,7 @@ impl Judge {
             let word = |column| cell(row, column).to_ascii_lowercase();
             clear.is_none_or(|column| matches!(word(column).as_str(), "true" | "1" | "yes"))
         };
-        let distances = Points::by_displacement(rows, loaded.basis.facts.area).distances();
+        let distances = Points::by_displacement(rows, loaded.basis.total_mass()).distances();
         let queries = names.iter().enumerate().filter_map(|(index, name)| {
             let members = |run: &usize| label_of_row[*run] == Some(index);
             let clear: Vec<usize> =

@@ -172,6 +172,17 @@ pub enum Error {
         /// What is wrong with it.
         source: mesh_spectrum::MeshError,
     },
+    /// A mesh file that cannot be read.
+    #[error("{0}")]
+    MeshFile(mesh_files::Error),
+    /// A mesh file that holds no usable mesh.
+    #[error("{}: {source}", path.display())]
+    BadMesh {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with the mesh.
+        source: mesh_spectrum::MeshError,
+    },
     /// Joining the components failed.
     #[error("join: {0}")]
     Join(#[from] mesh_spectrum::JoinError),
@@ -391,6 +402,11 @@ impl Error {
                 "the run may not have started, or may have been cut short; copy it again, or leave it out with `add --skip-bad`"
             }
             Self::Mesh { .. } => "choose another reference run, or parts without the fault, with --part",
+            Self::MeshFile(mesh_files::Error::Io { .. }) => return None,
+            Self::MeshFile(mesh_files::Error::Unknown { .. }) => {
+                "give the file the ending of its format; a result file is a d3plot root file or its folder"
+            }
+            Self::MeshFile(_) | Self::BadMesh { .. } => "write it again with the program that made it",
             Self::Join(_) => "give a distance in the model's length unit, a little above the gap between the sheets",
             Self::Operator(_) => "choose other parts with --part, or mend the mesh",
             Self::Eigen(_) => "ask for fewer eigenpairs (-K), or report this mesh",
@@ -433,6 +449,15 @@ impl Error {
 /// Wraps the system's answer with what was tried and where.
 pub(crate) fn io<'a>(action: &'static str, path: &'a Path) -> impl FnOnce(std::io::Error) -> Error + 'a {
     move |source| Error::Io { action, path: path.to_owned(), source }
+}
+
+impl From<mesh_spectrum::OperatorError> for Error {
+    fn from(error: mesh_spectrum::OperatorError) -> Self {
+        match error {
+            mesh_spectrum::OperatorError::Join(error) => Self::Join(error),
+            other => Self::Operator(other),
+        }
+    }
 }
 
 impl From<mesh_spectrum::EigenError> for Error {

@@ -166,7 +166,8 @@ pub fn regions(loaded: &Loaded, a: &Target, b: &Target, octave: usize) -> Result
     let of = |target: &Target| -> Vec<f64> {
         let values: Vec<Vector> = within.iter().map(|&j| target.rotation[j - 1]).collect();
         let local: Vec<f64> = synthesize(&loaded.basis, &within, &values).into_iter().map(square).collect();
-        let mean = local.iter().zip(&loaded.basis.mass).map(|(x, m)| x * m).sum::<f64>() / loaded.basis.facts.area;
+        let mean =
+            local.iter().zip(&loaded.basis.area).map(|(x, share)| x * share).sum::<f64>() / loaded.basis.facts.area;
         local.into_iter().map(|x| if mean > 0.0 { x / mean } else { 0.0 }).collect()
     };
     let (first, second) = (of(a), of(b));

@@ -9,12 +9,14 @@
 //! | open result files, find and name them | [`run`], [`bundle`] | paths | [`run::Run`] |
 //! | input tables | [`inputs`] | CSV | a row a run |
 //! | the surface all runs share | [`mod@reference`] | a run, parts | [`reference::Reference`] |
+//! | the surface of any file | [`surface`] | a mesh file or a run | [`surface::Surface`] |
 //! | what welds and ties hold of it | [`joints`] | a deck | [`joints::Joints`] |
 //! | eigenbasis | [`basis`] | the reference | [`basis::Basis`] |
 //! | how each place has turned | [`rotation`] | a shape | sin θ × axis |
 //! | other quantities on it: plastic strain | [`field`] | a run, a state | a function on the surface |
 //! | coefficients of every state | [`project`] | a run | [`project::Projected`] |
 //! | what is kept on disk | [`study`] | all of it | [`study::Study`] |
+//! | eigenpairs of a surface, alone | [`eigen`] | a surface | [`eigen::Solved`], a file |
 //! | a state that the user names | [`target`] | `run_007@3` | [`target::Target`] |
 //! | deformation modes | [`modes`] | coefficients | [`modes::Modes`] |
 //! | which coefficients are looked at | [`select`] | α or δ | values |
@@ -40,6 +42,7 @@ pub mod classify;
 pub mod compare;
 pub mod deck;
 pub mod descriptor;
+pub mod eigen;
 mod error;
 pub mod explain;
 pub mod export;
@@ -58,9 +61,10 @@ pub mod run;
 pub mod select;
 pub mod similarity;
 pub mod study;
+pub mod surface;
 pub mod target;
 pub mod transfer;
 mod vector;
 
 pub use error::Error;
-pub use mesh_spectrum::Watch;
+pub use mesh_spectrum::{EigenOptions, Kind, Mass, OperatorOptions, UnknownName, Watch};

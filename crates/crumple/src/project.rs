@@ -84,13 +84,14 @@ impl ProjectedState {
 /// Numbers about one state that need the whole shape.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Measures {
-    /// M-weighted root mean square displacement, in the length unit.
+    /// Root mean square displacement over the surface (each vertex by its area), in the length unit.
     pub rms: f64,
     /// Largest displacement of a vertex, in the length unit.
     pub max: f64,
     /// Share of ‖p − p⁰‖²_M that the K coefficients catch (Parseval), 0 to 1; 1 for a state without displacement.
     pub captured: f64,
-    /// Share of ‖p − p⁰‖²_M that the best rigid motion explains, 0 to 1; 0 for a state without displacement.
+    /// Share of the mean square displacement over the surface that the best rigid motion explains, 0 to 1; 0 for a state
+    /// without displacement.
     pub rigid_share: f64,
     /// Median of |edge strain|: how far the surface is from isometric.
     pub strain_median: f64,
@@ -100,7 +101,8 @@ pub struct Measures {
     pub area_median: f64,
     /// 95 % quantile of the same.
     pub area_p95: f64,
-    /// Root mean square of sin θ of the rotation field over the surface: how much the surface turned, 0 to 1.
+    /// Root mean square of sin θ of the rotation field in M, as its coefficients are (with the lumped mass: over the
+    /// surface): how much the surface turned, 0 to 1.
     pub turn: f64,
 }
 
@@ -276,10 +278,7 @@ impl<'a> Projector<'a> {
         clock.lap(&mut spent.displacement);
         let turned: Vec<Vec<Vector>> = shapes.iter().map(|shape| self.rest.field(shape)).collect();
         let rotations = coefficients_of(basis, &turned);
-        measures
-            .iter_mut()
-            .zip(&turned)
-            .for_each(|(measures, turned)| measures.turn = geometry.mean_square(turned).sqrt());
+        measures.iter_mut().zip(&turned).for_each(|(measures, turned)| measures.turn = geometry.turn(turned));
         clock.lap(&mut spent.rotation);
         let quantities: Vec<Vec<Vec<Vector>>> =
             quantities.iter().map(|values| coefficients_of(basis, values)).collect();
@@ -367,9 +366,12 @@ struct Geometry<'a> {
     triangles: &'a [[u32; 3]],
     /// Areas of the triangles, T.
     areas: Vec<f64>,
-    mass: &'a [f64],
+    /// For M-products.
+    basis: &'a Basis,
+    /// Area of each vertex, N.
+    shares: &'a [f64],
     area: f64,
-    /// Σ m |p⁰ − centre|²: the size of the part.
+    /// Σ a |p⁰ − centre|²: the size of the part.
     spread: f64,
     edges: Vec<(u32, u32, f64)>,
     edge_mean: f64,
@@ -390,32 +392,32 @@ impl<'a> Geometry<'a> {
         let length = |a: u32, b: u32| distance(undeformed[a as usize], undeformed[b as usize]);
         let edges: Vec<_> = ends.into_iter().map(|(a, b)| (a, b, length(a, b))).filter(|edge| edge.2 > 0.0).collect();
         let edge_mean = edges.iter().map(|edge| edge.2).sum::<f64>() / edges.len().max(1) as f64;
-        let mass = &basis.mass[..];
         let triangles = reference.mesh.triangles();
         let areas = triangles.iter().map(|corners| area(corners.map(|vertex| undeformed[vertex as usize]))).collect();
-        let mut geometry =
-            Self { undeformed, triangles, areas, mass, area: mass.iter().sum(), spread: 0.0, edges, edge_mean };
+        let (shares, area) = (&basis.area[..], basis.area.iter().sum());
+        let mut geometry = Self { undeformed, triangles, areas, basis, shares, area, spread: 0.0, edges, edge_mean };
         let centre = geometry.centre(undeformed);
-        geometry.spread = undeformed.iter().zip(mass).map(|(p, m)| m * square(subtract(*p, centre))).sum();
+        geometry.spread = undeformed.iter().zip(shares).map(|(p, share)| share * square(subtract(*p, centre))).sum();
         geometry
     }
 
     /// Centre of mass of a shape.
     fn centre(&self, shape: &[[f64; 3]]) -> [f64; 3] {
-        std::array::from_fn(|c| shape.iter().zip(self.mass).map(|(p, m)| m * p[c]).sum::<f64>() / self.area)
+        std::array::from_fn(|c| shape.iter().zip(self.shares).map(|(p, share)| share * p[c]).sum::<f64>() / self.area)
     }
 
     fn displacement(&self, shape: &[[f64; 3]]) -> Vec<[f64; 3]> {
         shape.iter().zip(self.undeformed).map(|(p, q)| subtract(*p, *q)).collect()
     }
 
-    /// Mean over the surface of |f|².
-    fn mean_square(&self, values: &[Vector]) -> f64 {
-        values.iter().zip(self.mass).map(|(f, m)| m * square(*f)).sum::<f64>() / self.area
+    /// Root mean square of a rotation field in M, so that `turn`² ‖1‖²_M is the energy that its coefficients share.
+    fn turn(&self, rotation: &[Vector]) -> f64 {
+        (self.basis.square_norm(rotation) / self.basis.total_mass()).sqrt()
     }
 
     fn measures(&self, shape: &[[f64; 3]], displacement: &[[f64; 3]], delta: &[[f64; 3]]) -> Measures {
-        let norm2 = self.mean_square(displacement) * self.area;
+        let norm2: f64 = displacement.iter().zip(self.shares).map(|(d, share)| share * square(*d)).sum();
+        let energy = self.basis.square_norm(displacement);
         let max = displacement.iter().map(|d| square(*d)).fold(0.0, f64::max).sqrt();
         let caught: f64 = delta.iter().map(|d| square(*d)).sum();
         let strain =
@@ -429,7 +431,7 @@ impl<'a> Geometry<'a> {
         Measures {
             rms: (norm2 / self.area).sqrt(),
             max,
-            captured: if norm2 > 0.0 { (caught / norm2).min(1.0) } else { 1.0 },
+            captured: if energy > 0.0 { (caught / energy).min(1.0) } else { 1.0 },
             // Of a displacement that is tiny against the part the difference of two large sums says nothing.
             rigid_share: if norm2 > 1e-12 * self.spread {
                 (1.0 - self.rigid_rest(shape) / norm2).clamp(0.0, 1.0)
@@ -445,13 +447,13 @@ impl<'a> Geometry<'a> {
         }
     }
 
-    /// min over rigid motions of ‖p − (R p⁰ + t)‖²_M: Horn 1987, the rotation from the largest eigenvector of a 4 × 4
-    /// matrix. With centred shapes the minimum is Σ m (|p|² + |p⁰|²) − 2 λ_max.
+    /// min over rigid motions of Σ a |p − (R p⁰ + t)|²: Horn 1987, the rotation from the largest eigenvector of a 4 × 4
+    /// matrix. With centred shapes the minimum is Σ a (|p|² + |p⁰|²) − 2 λ_max.
     fn rigid_rest(&self, shape: &[[f64; 3]]) -> f64 {
         let (p0, q0) = (self.centre(self.undeformed), self.centre(shape));
         let mut s = [[0.0; 3]; 3];
         let mut spread = 0.0;
-        for ((p, q), m) in self.undeformed.iter().zip(shape).zip(self.mass) {
+        for ((p, q), m) in self.undeformed.iter().zip(shape).zip(self.shares) {
             let (p, q) = (subtract(*p, p0), subtract(*q, q0));
             for i in 0..3 {
                 for j in 0..3 {

@@ -99,7 +99,7 @@ pub struct Comparer {
     /// The target after all that.
     target: Vec<f64>,
     metric: Metric,
-    /// Turns features into root mean square lengths: 1 / √area for coefficients.
+    /// Turns features into root mean square lengths: 1 / √(total mass), which is the area but for the identity as mass, for coefficients.
     to_length: f64,
     /// Inverse of the shrunk covariance.
     precision: Option<Mat<f64>>,
@@ -148,7 +148,7 @@ impl Comparer {
         let centre = if centred { mean } else { vec![0.0; target.len()] };
         let to_length = match kind {
             Kind::Rotation => 1.0,
-            Kind::Paper => 1.0 / basis.facts.area.sqrt(),
+            Kind::Paper => 1.0 / basis.total_mass().sqrt(),
         };
         let mut comparer = Self { features, centre, weights, target: Vec::new(), metric, to_length, precision: None };
         comparer.target = comparer.transform(target);

@@ -34,8 +34,8 @@ pub fn transfer(from: &Loaded, to: &Loaded, descriptor: &Descriptor) -> Result<(
                 .iter()
                 .map(|row| std::array::from_fn(|c| row.iter().zip(&rho).map(|(weight, rho)| weight * rho[c]).sum()))
                 .collect();
-            // ρ grows with the length of the part, and so does √E: the energy is the query's own.
-            Ruler::of(&to.basis).direction(&carried, spectrum.turn * from.basis.facts.area.sqrt())
+            // The energy is the query's own, in the mass that its coefficients have now.
+            Ruler::of(&to.basis).direction(&carried, spectrum.turn * to.basis.total_mass().sqrt())
         }
         Some(_) => spectrum.direction.clone(),
         None => Vec::new(),
@@ -81,6 +81,6 @@ fn map(from: &Loaded, to: &Loaded) -> Option<Vec<Vec<f64>>> {
 /// Eigenvectors of `from` that are carried over: two octaves of wavelength beyond those that have a direction.
 fn long_waves(from: &Loaded) -> usize {
     let basis = &from.basis;
-    let limit = 16.0 * (std::f64::consts::PI / basis.facts.length).powi(2);
+    let limit = 16.0 * (std::f64::consts::PI / basis.facts.length).powi(2) / basis.per_square_length();
     basis.eigenvalues.iter().take_while(|&&eigenvalue| eigenvalue < limit).count()
 }

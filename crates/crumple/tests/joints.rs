@@ -155,7 +155,7 @@ fn welds_and_rigid_bodies_hold_their_nodes() {
 #[test]
 fn a_study_keeps_what_joined_it_and_check_holds_it_true() {
     let world = World::new();
-    let options = |join| BasisOptions { eigenpairs: 20, join };
+    let options = |join| BasisOptions { eigenpairs: 20, join, ..Default::default() };
     let run = world.deck("*SET_NODE_LIST\n1\n1001,1014,1040\n*CONTACT_TIED_NODES_TO_SURFACE\n1,1,4,3\n");
     let apart = Study::create(&world.path("apart"), &run, &[], &[], &options(None), &()).unwrap();
     assert_eq!(apart.basis().unwrap().facts.null_space, 2);
@@ -212,7 +212,7 @@ fn seal(study: &Path, file: &str) {
 #[test]
 fn a_deck_of_another_model_is_refused() {
     let world = World::new();
-    let options = BasisOptions { eigenpairs: 5, join: Some(Join::DECK) };
+    let options = BasisOptions { eigenpairs: 5, join: Some(Join::DECK), ..Default::default() };
     let run = world.deck("");
     let other = world.path("other.k");
     std::fs::write(&other, "*NODE\n1,0,0,0\n").unwrap();

@@ -4,16 +4,18 @@
 //!
 //! - L' = Pᵀ L P, the energy of the constrained fields. An edge's share w (uᵢ − uⱼ)² is w (Σ d_a x_a)² with Σ d = 0, and
 //!   that is −w Σ_{a<b} d_a d_b (x_a − x_b)²: edges again, so L' stays a symmetric Laplacian with L'·1 = 0;
-//! - M' = the row sums of Pᵀ M P, that is, Pᵀ m for the diagonal m of M: each vertex that follows gives its area to
-//!   those it follows, by its weights. Explicit finite-element codes treat the mass of tied nodes so.
+//! - M' = Pᵀ M P where M is not diagonal (consistent mass), and on vertices M as it is;
+//! - M' = the row sums of Pᵀ M P where M is diagonal (lumped mass, identity), that is, Pᵀ m for the diagonal m of M: each
+//!   vertex that follows gives its share to those it follows, by its weights. Explicit finite-element codes treat the
+//!   mass of tied nodes so.
 //!
-//! Why row sums: Pᵀ M P itself has entries beside its diagonal as soon as a vertex follows two others. The row sums are
+//! None of this asks which discretisation L and M are from. Why row sums: Pᵀ M P itself has entries beside its diagonal as soon as a vertex follows two others. The row sums are
 //! positive (weights are), keep the total area (P·1 = 1), and are Pᵀ M P itself where every vertex follows at most one
 //! other, which is joining by distance and welding node to node. A lumped mass is a quadrature rule that is exact for
 //! linear functions on a face; moving a point of it by Σ w keeps the value of every linear function there, so the
 //! order of the error stays what lumping made it.
 //!
-//! On vertices the same M' is a diagonal `vertex_mass` with 0 at the vertices that follow several others (whose value the
+//! On vertices the same diagonal M' is a `vertex_mass` with 0 at the vertices that follow several others (whose value the
 //! others have) and the old area where a vertex follows one: Σ_v m'_v φᵢ(v) φⱼ(v) = δᵢⱼ exactly, with φ = P x.
 
 use thiserror::Error;
@@ -200,6 +202,37 @@ impl Reduction {
         reduced
     }
 
+    /// M' = Pᵀ M P from entries (i, j, m), i ≠ j, of M that stand for both places, and its diagonal: the same on degrees of
+    /// freedom.
+    pub(crate) fn mass(&self, pairs: &[(u32, u32, f64)], diagonal: &[f64]) -> (Vec<(u32, u32, f64)>, Vec<f64>) {
+        let weights = self.weights();
+        let own: Vec<Weights> = self.dof_of_vertex.iter().map(|&dof| vec![(dof, 1.0)]).collect();
+        let of = |vertex: u32| match weights[vertex as usize] {
+            Some(several) => &several[..],
+            None => &own[vertex as usize][..],
+        };
+        let mut sums = vec![0.0; self.dofs];
+        let mut reduced = Vec::with_capacity(pairs.len());
+        for &(i, j, m) in pairs {
+            for &(a, of_i) in of(i) {
+                for &(b, of_j) in of(j) {
+                    match a == b {
+                        true => sums[a as usize] += 2.0 * m * of_i * of_j,
+                        false => reduced.push((a, b, m * of_i * of_j)),
+                    }
+                }
+            }
+        }
+        for (i, &m) in (0..).zip(diagonal) {
+            let parts = of(i);
+            for (at, &(a, of_a)) in parts.iter().enumerate() {
+                sums[a as usize] += m * of_a * of_a;
+                reduced.extend(parts[at + 1..].iter().map(|&(b, of_b)| (a, b, m * of_a * of_b)));
+            }
+        }
+        (reduced, sums)
+    }
+
     /// M' on vertices: the area of a vertex that follows several goes to those it follows.
     pub(crate) fn vertex_mass(&self, mut mass: Vec<f64>) -> Vec<f64> {
         let vertex_of_dof = self.vertex_of_dof();
@@ -285,7 +318,7 @@ mod tests {
     }
 
     #[test]
-    fn reduced_edges_have_the_energy_of_the_constrained_field() {
+    fn reduced_matrices_have_the_energy_and_the_norm_of_the_constrained_field() {
         let ties = [tie(0, &[(1, 0.3), (2, 0.7)]), tie(3, &[(0, 0.5), (4, 0.5)])];
         let reduction = Reduction::new(5, &ties).unwrap();
         let edges = vec![(0, 1, 2.0), (0, 3, 1.5), (2, 4, 0.5), (3, 4, 3.0), (1, 2, -0.25)];
@@ -297,6 +330,14 @@ mod tests {
             edges.iter().map(|&(i, j, w)| w * (u[i as usize] - u[j as usize]).powi(2)).sum()
         };
         let whole = energy(&edges, &u);
+        let diagonal = [3.0, 1.0, 2.0, 5.0, 4.0];
+        let product = |pairs: &[(u32, u32, f64)], diagonal: &[f64], u: &[f64]| -> f64 {
+            let beside = pairs.iter().map(|&(i, j, m)| 2.0 * m * u[i as usize] * u[j as usize]);
+            diagonal.iter().zip(u).map(|(m, u)| m * u * u).chain(beside).sum()
+        };
+        let (pairs, reduced) = reduction.mass(&edges, &diagonal);
+        let mass = product(&edges, &diagonal, &u);
+        assert!((product(&pairs, &reduced, &x) - mass).abs() < 1e-12 * mass.abs());
         assert!((energy(&reduction.edges(edges), &x) - whole).abs() < 1e-12 * whole.abs());
     }
 }

@@ -2,7 +2,9 @@
 
 use std::f64::consts::PI;
 
-use mesh_spectrum::{EigenOptions, Mesh, Operator, OperatorOptions, Tie, eigenbasis, operator, ties_of};
+use mesh_spectrum::{
+    EigenOptions, Kind, Mass, Mesh, Operator, OperatorError, OperatorOptions, Tie, eigenbasis, operator, ties_of,
+};
 
 /// A grid of nx × ny squares over [x0, x1] × [0, 1], split along one diagonal, appended to vertices and triangles.
 fn grid(x0: f64, x1: f64, nx: u32, ny: u32, vertices: &mut Vec<[f64; 3]>, triangles: &mut Vec<[u32; 3]>) -> Vec<u32> {
@@ -111,4 +113,70 @@ fn pairs_by_distance_are_ties_of_one_weight() {
     for k in 0..40 {
         assert!(free[k] <= held[k] + 1e-9 && held[k] <= free[k + 2] + 1e-9, "{k}");
     }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+#[test]
+fn ties_hold_on_every_discretisation_with_every_mass() {
+    let (mesh, ties) = halves();
+    // The same mesh of squares, which is what the polygon operator is for.
+    let square = |pair: &[[u32; 3]]| [pair[0][0], pair[0][1], pair[0][2], pair[1][2]];
+    let squares: Vec<[u32; 4]> = mesh.triangles().chunks(2).map(square).collect();
+    let mesh = Mesh::from_faces(mesh.vertices().to_vec(), &squares).unwrap();
+    let n = mesh.vertices().len();
+    for kind in [Kind::Cotan, Kind::Tufted, Kind::Polygon] {
+        for mass in [Mass::Lumped, Mass::Consistent, Mass::Identity] {
+            let build = |ties: &[Tie]| {
+                operator(&mesh, &OperatorOptions { ties: ties.to_vec(), kind, mass, ..Default::default() }).unwrap()
+            };
+            let (free, tied) = (build(&[]), build(&ties));
+            let x: Vec<f64> = (0..tied.mass.len()).map(|at| (at as f64).sin()).collect();
+            let mut u: Vec<f64> = tied.dof_of_vertex.iter().map(|&dof| x[dof as usize]).collect();
+            for (vertex, weights) in &tied.followers {
+                u[*vertex as usize] = weights.iter().map(|&(dof, weight)| weight * x[dof as usize]).sum();
+            }
+            // Sums of 1,600 products in another order.
+            let near = |a: f64, b: f64| (a - b).abs() < 1e-12 * b.abs();
+            let energy = dot(&free.stiffness.times(&u), &u);
+            assert!(near(dot(&tied.stiffness.times(&x), &x), energy), "{kind} {mass}: L' = Pᵀ L P");
+            if let Some(matrix) = &tied.mass_matrix {
+                let norm = dot(&free.vertex_mass_times(&u), &u);
+                assert!(near(dot(&matrix.times(&x), &x), norm), "{kind} {mass}: M' = Pᵀ M P");
+            }
+            let total: f64 = free.mass.iter().sum();
+            for shared in [&tied.mass, &tied.vertex_mass] {
+                assert!(near(shared.iter().sum(), total), "{kind} {mass}: no mass is lost");
+            }
+            assert!(near(tied.vertex_area.iter().sum(), 2.0), "{kind} {mass}: the area");
+
+            let basis = eigenbasis(&tied, &EigenOptions { count: 20, ..Default::default() }, &()).unwrap();
+            assert!(basis.certificate.complete && basis.eigenvalues[1] > 0.0);
+            for (i, a) in basis.eigenvectors.chunks_exact(n).enumerate() {
+                for tie in &ties {
+                    let mean: f64 = tie.to.iter().map(|&(vertex, weight)| weight * a[vertex as usize]).sum();
+                    assert!((a[tie.vertex as usize] - mean).abs() < 1e-12, "{kind} {mass}");
+                }
+                let weighed = tied.vertex_mass_times(a);
+                for (j, b) in basis.eigenvectors.chunks_exact(n).enumerate() {
+                    let off = dot(&weighed, b) - f64::from(u8::from(i == j));
+                    assert!(off.abs() < 1e-10, "{kind} {mass}: orthonormal in M on vertices");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_piece_that_hangs_between_two_others_by_mass_alone_is_named() {
+    // Each corner of the first triangle follows the middle between the other two.
+    let corners = |x: f64| [[x, 0.0, 0.0], [x + 1.0, 0.0, 0.0], [x, 1.0, 0.0]];
+    let vertices = [0.0, 5.0, 9.0].into_iter().flat_map(corners).collect();
+    let mesh = Mesh::new(vertices, vec![[0, 1, 2], [3, 4, 5], [6, 7, 8]]).unwrap();
+    let ties: Vec<Tie> = (0..3).map(|vertex| Tie { vertex, to: vec![(3, 0.5), (6, 0.5)] }).collect();
+    let build = |mass| operator(&mesh, &OperatorOptions { ties: ties.clone(), mass, ..Default::default() });
+    assert_eq!(build(Mass::Lumped).unwrap().components, 2);
+    assert_eq!(build(Mass::Consistent), Err(OperatorError::MassAcross { vertex: 3 }));
 }

@@ -141,7 +141,7 @@ impl Analyze {
                 if study.is_for(reference, &self.basis.parts, &fields, &options)? {
                     return Ok(study);
                 }
-                let what = "the study here has another mesh, other parts or fields, another join or another number of eigenpairs"
+                let what = "the study here has another mesh, other parts or fields, another operator, another join or another number of eigenpairs"
                     .to_owned();
                 Err(Error::StudyExists { folder, what })
             }

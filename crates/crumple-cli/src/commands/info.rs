@@ -128,7 +128,7 @@ impl Info {
         let descriptors = descriptor::list(&study)?;
         let facts = json!({
             "study": study.folder(), "reference": settings.reference, "parts": settings.parts, "join": settings.join,
-            "deck": settings.deck,
+            "deck": settings.deck, "operator": settings.operator, "mass": settings.mass,
             "vertices": manifest.vertices, "eigenpairs": manifest.eigenpairs, "inputs": manifest.inputs,
             "runs": manifest.runs.keys().collect::<Vec<_>>(), "modes": names, "descriptors": descriptors,
         });
@@ -146,10 +146,12 @@ impl Info {
                 Some(Join::Deck(_)) => "joined by the deck's welds and ties".to_owned(),
             };
             format!(
-                "study of {} runs on {} vertices, {} eigenpairs, {join}; reference {}\ndescriptors: {}\n{}",
+                "study of {} runs on {} vertices, {} eigenpairs ({}, {} mass), {join}; reference {}\ndescriptors: {}\n{}",
                 manifest.runs.len(),
                 manifest.vertices,
                 manifest.eigenpairs,
+                settings.operator,
+                settings.mass,
                 settings.reference,
                 or_none(&descriptors),
                 table(&["run", "#states", "#last time", "mode", "file"], rows)

@@ -62,6 +62,9 @@ pub(crate) fn facts(loaded: &Loaded) -> Result<Value, Error> {
         "area": facts.area,
         "components": facts.components,
         "null_space": facts.null_space,
+        "operator": facts.operator,
+        "mass": facts.mass,
+        "tufted_advice": facts.tufted_advice,
         "join": facts.join,
         "joined_pairs": facts.joined_pairs,
         "joints": joints.map(|joints| json!({
@@ -89,13 +92,15 @@ fn words(loaded: &Loaded) -> String {
         Some(Join::Deck(_)) => format!(", {} ties of the deck", facts.joined_pairs - facts.idle_ties),
     };
     format!(
-        "study      {}\nsurface    {} vertices, {} triangles, {} piece{}{join}; parts: {}\nbasis      {} eigenpairs, none missing: {}; residual {:.1e}, orthogonality {:.1e}",
+        "study      {}\nsurface    {} vertices, {} triangles, {} piece{}{join}; parts: {}\noperator   {}, {} mass\nbasis      {} eigenpairs, none missing: {}; residual {:.1e}, orthogonality {:.1e}",
         loaded.study.folder().display(),
         loaded.reference.vertices(),
         loaded.reference.mesh.triangles().len(),
         facts.components,
         if facts.components == 1 { "" } else { "s" },
         loaded.reference.parts.join(", "),
+        facts.operator,
+        facts.mass,
         loaded.basis.eigenpairs(),
         if facts.complete { "certified" } else { "not certified" },
         facts.residual,
@@ -141,11 +146,17 @@ pub(crate) fn advise(loaded: &Loaded, output: &Output) -> Result<(), Error> {
     if facts.join.and_then(Join::distance).is_some() && facts.joined_pairs == 0 {
         output.note("the join found no pair of vertices within its distance; the pieces stay apart");
     }
-    if facts.non_manifold_edges > 0 {
-        output.note(&format!("{} edges have more than two faces; all of them are summed", facts.non_manifold_edges));
-    }
+    tufted(&facts.tufted_advice, output);
     if facts.flat_triangles > 0 {
         output.note(&format!("{} triangles have no area and are left out of the operator", facts.flat_triangles));
     }
     Ok(())
+}
+
+/// Recommends the tufted operator where there are reasons for it.
+pub(crate) fn tufted(reasons: &[String], output: &Output) {
+    if !reasons.is_empty() {
+        let reasons = reasons.join("; ");
+        output.note(&format!("{reasons}. The operator made for such meshes: --operator tufted"));
+    }
 }

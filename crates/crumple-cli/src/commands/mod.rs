@@ -7,6 +7,7 @@ mod classify;
 mod compare;
 mod describe;
 mod distance;
+mod eigen;
 mod explain;
 mod export;
 mod info;
@@ -37,6 +38,8 @@ pub(crate) enum Command {
     Analyze(analyze::Analyze),
     /// What a result file or a study holds
     Info(info::Info),
+    /// Eigenpairs of any mesh or result file, alone
+    Eigen(eigen::Eigen),
     /// Make a study: the reference mesh and its eigenbasis
     Init(init::Init),
     /// Add runs to a study: project each of their states
@@ -72,6 +75,7 @@ impl Command {
         match self {
             Self::Analyze(command) => command.run(output, watch),
             Self::Info(command) => command.run(output),
+            Self::Eigen(command) => command.run(output, watch),
             Self::Init(command) => command.run(output, watch),
             Self::Add(command) => command.run(output, watch),
             Self::Modes(command) => command.run(output, watch),

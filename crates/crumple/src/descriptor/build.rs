@@ -348,11 +348,12 @@ pub(crate) fn choose(
     } else {
         0.0
     };
+    let total_mass = basis.total_mass();
     let always = if is_shape { basis.always_in_reconstruction() } else { 1..1 };
     threshold.select(&values, function.components(), signed, |order, m| {
         let left_out = order[m..].iter().filter(|j| !always.contains(j));
         let rest: f64 = left_out.map(|&j| square(values[j - 1])).sum();
-        (beyond * beyond + rest / basis.facts.area).sqrt()
+        (beyond * beyond + rest / total_mass).sqrt()
     })
 }
 

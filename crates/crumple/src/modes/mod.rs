@@ -151,7 +151,7 @@ pub struct Tried {
 /// errors.
 pub fn modes(study: &Study, options: &ModesOptions, watch: &dyn Watch) -> Result<Modes, Error> {
     let basis = study.basis()?;
-    let area = basis.facts.area;
+    let total_mass = basis.total_mass();
     if study.manifest().runs.len() < RUNS_MIN {
         let have = study.manifest().runs.len();
         return Err(Error::TooFewRuns { what: "grouping into modes", needed: RUNS_MIN, have });
@@ -161,7 +161,7 @@ pub fn modes(study: &Study, options: &ModesOptions, watch: &dyn Watch) -> Result
     {
         return Err(crate::target::unknown_field(field, study.settings().fields.iter().copied()));
     }
-    let sampled = states::sample(study, options.by, &options.states, area)?;
+    let sampled = states::sample(study, options.by, &options.states, total_mass)?;
     let runs = sampled.runs.len();
     if runs < RUNS_MIN {
         let what = "grouping into modes by states that all runs reach";

@@ -66,7 +66,7 @@ pub(super) fn partings(
     if states.saturating_mul(3 * study.manifest().eigenpairs) > VALUES_MAX {
         return Ok(Err(format!("{states} states are too many to look for the state at which modes part")));
     }
-    let histories = Histories::read(study, by, Along::Time, basis.facts.area)?;
+    let histories = Histories::read(study, by, Along::Time, basis.total_mass())?;
     let of_run =
         |id: &String| histories.runs.binary_search_by(|run| run.run.cmp(id)).ok().map(|at| &histories.runs[at]);
     let mut runs: Vec<&History> = Vec::new();

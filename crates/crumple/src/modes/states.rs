@@ -30,7 +30,7 @@ pub(super) struct Sampled {
 ///
 /// # Errors
 /// [`Error::Value`] for a station that no three runs reach, reading errors.
-pub(super) fn sample(study: &Study, by: By, states: &States, area: f64) -> Result<Sampled, Error> {
+pub(super) fn sample(study: &Study, by: By, states: &States, total_mass: f64) -> Result<Sampled, Error> {
     let (along, asked) = match states {
         States::Last => {
             let rows = study.coefficients_of(by.function(), None, Rows::Last)?;
@@ -40,7 +40,7 @@ pub(super) fn sample(study: &Study, by: By, states: &States, area: f64) -> Resul
         States::At { along, stations } => (*along, Some(stations)),
         States::Series { along } => (*along, None),
     };
-    let histories = Histories::read(study, by, along, area)?;
+    let histories = Histories::read(study, by, along, total_mass)?;
     let unit = match along {
         Along::Time => &study.settings().time_unit,
         Along::Intrusion => &study.settings().length_unit,
@@ -167,12 +167,12 @@ impl Histories {
     ///
     /// # Errors
     /// Reading errors.
-    pub(super) fn read(study: &Study, by: By, along: Along, area: f64) -> Result<Self, Error> {
+    pub(super) fn read(study: &Study, by: By, along: Along, total_mass: f64) -> Result<Self, Error> {
         let rows = study.coefficients_of(by.function(), None, Rows::All)?;
         let progress: Vec<f64> = match along {
             Along::Time => rows.times.clone(),
-            Along::Intrusion if by.function() == crate::study::Function::Displacement => intrusions(&rows, area),
-            Along::Intrusion => intrusions(&study.coefficients(None, Rows::All)?, area),
+            Along::Intrusion if by.function() == crate::study::Function::Displacement => intrusions(&rows, total_mass),
+            Along::Intrusion => intrusions(&study.coefficients(None, Rows::All)?, total_mass),
         };
         let mut runs: Vec<History> = Vec::new();
         for (row, run) in rows.runs.iter().enumerate() {
@@ -215,7 +215,7 @@ impl Histories {
 }
 
 /// M-weighted RMS displacement of every row, of what its coefficients hold.
-fn intrusions(rows: &Coefficients, area: f64) -> Vec<f64> {
+fn intrusions(rows: &Coefficients, total_mass: f64) -> Vec<f64> {
     let square = |row: usize| rows.row(row).iter().map(|&x| f64::from(x).powi(2)).sum::<f64>();
-    (0..rows.rows()).map(|row| (square(row) / area).sqrt()).collect()
+    (0..rows.rows()).map(|row| (square(row) / total_mass).sqrt()).collect()
 }

@@ -3,7 +3,8 @@
 //! Only universal constants: no number depends on the other runs of a bundle, and the kind can be compared between
 //! meshes, parts and units. With ρ = Φᵀ M r, A the area, and E = ‖r‖²_M of the whole field, so that what lies beyond the
 //! K eigenvectors counts too, s_j = |ρ_j|² / E is the share of eigenvector j. Frequency is counted as by Weyl's law,
-//! ν_j = λ_j A / 4π: about the number of eigenvalues below λ_j of a surface of this area, whatever its mesh.
+//! ν_j = λ_j A / 4π: about the number of eigenvalues below λ_j of a surface of this area, whatever its mesh. With the
+//! identity as mass λ_j is a pure number, and λ_j N / A for N vertices takes its place: the same on a mesh of equal cells.
 //!
 //! **Kind.** For each octave of ν from 1 to 512 the mean, over the octave in log ν, of the share below ν,
 //! F(ν) = Σ_{ν_j ≤ ν} s_j, against that of a field with as much energy in every octave: where along the frequencies the
@@ -59,6 +60,8 @@ impl RotationSpectrum {
 #[derive(Debug, Clone)]
 pub struct Ruler {
     area: f64,
+    /// ‖1‖²_M, which times the square of `turn` is E.
+    total_mass: f64,
     /// For each eigenvector how much of each octave lies above its frequency, 0 to 1; K.
     above: Vec<[f64; OCTAVES]>,
     /// For each eigenvector the octave that its frequency lies in; K.
@@ -70,9 +73,10 @@ pub struct Ruler {
 impl Ruler {
     /// For the coefficients in a basis.
     pub fn of(basis: &Basis) -> Self {
-        let area = basis.facts.area;
+        let (area, total_mass) = (basis.facts.area, basis.total_mass());
+        let unit = basis.per_square_length();
         // log₂ of Weyl's count; the null space has none and lies below every octave.
-        let log = |eigenvalue: &f64| (eigenvalue * area / (4.0 * std::f64::consts::PI)).log2();
+        let log = |eigenvalue: &f64| (unit * eigenvalue * area / (4.0 * std::f64::consts::PI)).log2();
         let null_space = basis.facts.null_space;
         let logs: Vec<f64> = (0..)
             .zip(&basis.eigenvalues)
@@ -86,11 +90,16 @@ impl Ruler {
         // The longest half wave that fits into the part: λ = (π / ℓ)².
         let longest = (std::f64::consts::PI / basis.facts.length).powi(2);
         let weight = |(j, eigenvalue): (usize, &f64)| {
-            if logs[j] == f64::NEG_INFINITY { 1.0 } else { (1.0 - (eigenvalue / longest).log2() / 2.0).clamp(0.0, 1.0) }
+            if logs[j] == f64::NEG_INFINITY {
+                1.0
+            } else {
+                (1.0 - (unit * eigenvalue / longest).log2() / 2.0).clamp(0.0, 1.0)
+            }
         };
         let weights = basis.eigenvalues.iter().enumerate().map(weight).take_while(|weight| *weight > 0.0).collect();
         let octave = |log: &f64| (*log < OCTAVES as f64).then(|| log.max(0.0) as usize);
-        Self { area, above: logs.iter().map(above).collect(), octave: logs.iter().map(octave).collect(), weights }
+        let (above, octave) = (logs.iter().map(above).collect(), logs.iter().map(octave).collect());
+        Self { area, total_mass, above, octave, weights }
     }
 
     /// Triples that the direction has.
@@ -98,14 +107,14 @@ impl Ruler {
         self.weights.len()
     }
 
-    /// The spectrum of one state. `rho`: K × 3; `turn`: root mean square of sin θ over the surface.
+    /// The spectrum of one state. `rho`: K × 3; `turn`: root mean square of sin θ in M, ‖r‖_M / ‖1‖_M.
     pub fn spectrum(&self, rho: &[Vector], turn: f64) -> RotationSpectrum {
         let mut octaves = vec![0.0; OCTAVES];
         if turn < TURN_MIN {
             let direction = vec![Vector::default(); self.weights.len()];
             return RotationSpectrum { turn, octaves, kind: vec![0.0; OCTAVES], direction };
         }
-        let energy = turn * turn * self.area;
+        let energy = turn * turn * self.total_mass;
         let mut below = [0.0; OCTAVES];
         for ((rho, above), octave) in rho.iter().zip(&self.above).zip(&self.octave) {
             let share = square(*rho) / energy;

@@ -83,9 +83,9 @@ pub struct Settings {
     /// Quantities of the result files that are projected beside the shape.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fields: Vec<Field>,
-    /// The operator.
+    /// The operator: `cotan` (`cotangent` in older studies), `tufted` or `polygon`.
     pub operator: String,
-    /// The mass matrix.
+    /// The mass matrix: `lumped`, `consistent` or `identity`.
     pub mass: String,
     /// Unit of lengths: a label, nothing is converted.
     pub length_unit: String,
@@ -155,8 +155,8 @@ impl Study {
             join: options.join,
             fields: fields.to_vec(),
             deck: run.deck().map(|deck| absolute(deck.path())),
-            operator: "cotangent".into(),
-            mass: "lumped".into(),
+            operator: options.kind.to_string(),
+            mass: options.mass.to_string(),
             length_unit: "mm".into(),
             time_unit: "ms".into(),
         };
@@ -221,7 +221,7 @@ impl Study {
         &self.manifest
     }
 
-    /// Whether the study is what these wishes would make: the same surface, parts, fields, eigenpairs and join.
+    /// Whether the study is what these wishes would make: the same surface, parts, fields, eigenpairs, operator and join.
     ///
     /// # Errors
     /// Those of [`Reference::of_run`] and [`Study::reference`].
@@ -235,6 +235,8 @@ impl Study {
         };
         Ok(self.settings.eigenpairs == options.eigenpairs
             && self.settings.join == options.join
+            && self.settings.operator.parse() == Ok(options.kind)
+            && self.settings.mass.parse() == Ok(options.mass)
             && self.settings.fields == fields
             && self.settings.parts == reference.parts
             && same_mesh()?

@@ -264,7 +264,7 @@ impl World {
 
     /// A study of the mesh of one run, without runs.
     pub fn empty_study(&self, name: &str, reference: &str, eigenpairs: usize) -> Study {
-        let options = BasisOptions { eigenpairs, join: None };
+        let options = BasisOptions { eigenpairs, ..Default::default() };
         Study::create(&self.path(name), &self.open(reference), &[], &[], &options, &()).unwrap()
     }
 

@@ -166,7 +166,7 @@ pub(crate) fn merge(
 }
 
 /// Makes the entry of largest magnitude positive; among those within 1e-3 of it, the first.
-fn fix_sign(phi: &mut [f64]) {
+pub(crate) fn fix_sign(phi: &mut [f64]) {
     let most = phi.iter().fold(0.0f64, |most, x| most.max(x.abs()));
     let decides = phi.iter().find(|x| x.abs() >= (1.0 - 1e-3) * most);
     if decides.is_some_and(|x| *x < 0.0) {
@@ -175,7 +175,7 @@ fn fix_sign(phi: &mut [f64]) {
 }
 
 /// Maximal runs of two or more ascending values whose neighbours are at most `gap(the upper value)` apart.
-fn ranges(values: &[f64], gap: impl Fn(f64) -> f64) -> Vec<Range<usize>> {
+pub(crate) fn ranges(values: &[f64], gap: impl Fn(f64) -> f64) -> Vec<Range<usize>> {
     let mut ranges = Vec::new();
     let mut start = 0;
     for k in 1..=values.len() {

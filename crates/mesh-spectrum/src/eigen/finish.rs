@@ -10,8 +10,9 @@ use crate::eigen::component::{Component, Pairs};
 /// Inner products above this are removed. Slices leave 1e-12 (inside) to 2e-10 (across a border).
 const CLEAN_ABOVE: f64 = 1e-12;
 
-/// Inner products above this are no rounding: the same eigenspace was taken twice.
-const OVERLAP_MAX: f64 = 1e-6;
+/// Inner products above this are no rounding: the same eigenspace was taken twice. Below it the vectors span what they
+/// should, even where slivers make rounding large, and residuals measured afterwards decide whether they are eigenvectors.
+const OVERLAP_MAX: f64 = 1e-2;
 
 /// What was measured on the vectors as they are returned.
 #[derive(Debug, Clone, Copy)]
@@ -37,8 +38,7 @@ pub(crate) fn finish(component: &Component, pairs: &mut Pairs) -> Result<Evidenc
     pairs.vectors.par_chunks_mut(n).skip(1).for_each(|v| {
         let along: f64 = v.iter().zip(&null).map(|(v, null)| v * null).sum();
         v.iter_mut().zip(&null).for_each(|(v, null)| *v -= along * null);
-        let scale = 1.0 / v.iter().map(|v| v * v).sum::<f64>().sqrt();
-        v.iter_mut().for_each(|v| *v *= scale);
+        normalise(v);
     });
 
     let mut gram = gram(&pairs.vectors, n, count);
@@ -46,8 +46,12 @@ pub(crate) fn finish(component: &Component, pairs: &mut Pairs) -> Result<Evidenc
     if orthogonality.is_nan() || orthogonality > OVERLAP_MAX {
         return Err(EigenError::NotOrthogonal { loss: orthogonality });
     }
-    if orthogonality > 10.0 * CLEAN_ABOVE {
+    for _ in 0..4 {
+        if loss(&gram) <= 10.0 * CLEAN_ABOVE {
+            break;
+        }
         clean(&mut pairs.vectors, n, &gram);
+        pairs.vectors.par_chunks_mut(n).for_each(normalise);
         gram = self::gram(&pairs.vectors, n, count);
     }
     let residual = pairs
@@ -63,6 +67,11 @@ pub(crate) fn finish(component: &Component, pairs: &mut Pairs) -> Result<Evidenc
         })
         .reduce(|| 0.0, f64::max); // a maximum, the same in any order
     Ok(Evidence { residual, orthogonality: loss(&gram) })
+}
+
+fn normalise(v: &mut [f64]) {
+    let scale = 1.0 / v.iter().map(|v| v * v).sum::<f64>().sqrt();
+    v.iter_mut().for_each(|v| *v *= scale);
 }
 
 /// The lower half of Vᵀ V.

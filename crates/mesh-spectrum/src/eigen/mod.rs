@@ -3,7 +3,7 @@
 //! In the order of the work: `component` (mass scaled out, one connected component at a time), `factor` (L D Lᵀ and
 //! inertia), `solve` (its solves), `block` (dense products), `lanczos` (one shift), `slice` (the pairs around it),
 //! `assemble` (slices to a spectrum), `spectrum` (how far each component's must go), `finish` (orthogonality, residuals),
-//! `basis` (the merge of all components, on vertices).
+//! `basis` (the merge of all components, on vertices). `general` does all of it for a mass that is not diagonal.
 
 mod assemble;
 mod basis;
@@ -11,6 +11,7 @@ pub(crate) mod block;
 mod component;
 mod factor;
 mod finish;
+mod general;
 mod lanczos;
 mod slice;
 pub(crate) mod solve;
@@ -159,14 +160,13 @@ impl Progress<'_> {
 /// poorer basis. [`EigenError::Stopped`] within about a second of [`Watch::stopped`] (a factorisation of a large mesh
 /// is not interrupted).
 pub fn eigenbasis(operator: &Operator, options: &EigenOptions, watch: &dyn Watch) -> Result<Eigenbasis, EigenError> {
-    let &EigenOptions { count, tolerance, seed, dense_below } = options;
-    if count == 0 {
-        return Err(EigenError::Option { option: "count", value: 0.0, expected: "at least one eigenpair" });
+    if let Some(mass) = &operator.mass_matrix {
+        let mut basis = general::eigenbasis(operator, mass, options, watch)?;
+        operator.fill_followers(&mut basis.eigenvectors);
+        return Ok(basis);
     }
-    if !(tolerance > 0.0 && tolerance < 1e-2) {
-        return Err(EigenError::Option { option: "tolerance", value: tolerance, expected: "between 0 and 0.01" });
-    }
-    let count = count.min(operator.mass.len());
+    let &EigenOptions { count: _, tolerance, seed, dense_below } = options;
+    let count = check(options)?.min(operator.mass.len());
     let progress = Progress { watch, done: AtomicUsize::new(0), total: count };
 
     let mut components = split(operator)?;
@@ -206,6 +206,18 @@ pub fn eigenbasis(operator: &Operator, options: &EigenOptions, watch: &dyn Watch
     }
     progress.add(0);
     Ok(basis)
+}
+
+/// K as asked for, once the options are in their ranges.
+fn check(options: &EigenOptions) -> Result<usize, EigenError> {
+    let &EigenOptions { count, tolerance, .. } = options;
+    if count == 0 {
+        return Err(EigenError::Option { option: "count", value: 0.0, expected: "at least one eigenpair" });
+    }
+    if !(tolerance > 0.0 && tolerance < 1e-2) {
+        return Err(EigenError::Option { option: "tolerance", value: tolerance, expected: "between 0 and 0.01" });
+    }
+    Ok(count)
 }
 
 /// The operator's connected components, each with its own rows.
