@@ -41,7 +41,7 @@ example:
     cargo run --release -- analyze examples/hat-section/runs --params examples/hat-section/inputs.csv --join 2.5 -o {{ study }}
     test -s {{ study }}/report.html
 
-# the tables of docs/experiment.md and docs/joining.md
+# the tables of docs/experiment.md
 experiment:
     cargo build --release
     rm -rf target/plain target/joined
@@ -49,6 +49,12 @@ experiment:
     target/release/crumple analyze examples/hat-section/runs --join 2.5 -o target/joined
     target/release/crumple compare target/plain --labels examples/hat-section/labels.csv
     target/release/crumple compare target/joined --labels examples/hat-section/labels.csv
+
+# the tables of docs/joining.md: sheets apart, joined by distance, by the deck's welds, and with their nodes merged
+joining:
+    cargo build --release
+    rm -rf target/joining
+    python3 benches/joining.py target/release/crumple target/joining
 
 # licences, forbidden crates and sources of Cargo.lock; without network
 deny:

@@ -105,9 +105,9 @@ pub(crate) struct ModesArgs {
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     seed: Option<u64>,
     /// What makes runs alike: `rotation`, the kind and direction of the deformation wherever it happens, `displacement`,
-    /// where every place ends up, as in the paper, or `coordinates`, which have the distances of the displacement
-    /// [default: rotation]
-    #[arg(long, value_name = "WHAT")]
+    /// where every place ends up, as in the paper (also: `paper`), `coordinates`, which have the distances of the
+    /// displacement, or a field that the study keeps [default: rotation]
+    #[arg(long, visible_alias = "kind", value_name = "WHAT")]
     by: Option<String>,
     /// How to group: kmeans, ward, average, mixture (of Gaussians), or hdbscan, which leaves runs in no dense group without a
     /// mode [default: kmeans]
@@ -246,7 +246,7 @@ fn functions(text: &str) -> Result<Vec<Function>, Error> {
 pub(crate) struct SimilarityArgs {
     /// Which of the descriptor's numbers: `rotation`, the spectrum of the rotation field, which finds a deformation
     /// wherever on the part it happens, or `paper`, coefficients on the eigenvectors that matter [default: what the
-    /// descriptor was made for]
+    /// descriptor was made for; paper with --metric euclidean and --weight frequency]
     #[arg(long, value_name = "KIND")]
     kind: Option<String>,
     /// Compare only the coefficients of these eigenvectors, as 3,5,8-12, in place of the descriptor's own (kind paper)

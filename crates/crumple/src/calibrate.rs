@@ -69,7 +69,7 @@ pub fn calibrate(
         failed += held_yes.iter().filter(|&&x| x < threshold).count();
     }
     Ok(Calibration {
-        kind: options.kind.unwrap_or(descriptor.kind),
+        kind: options.kind_for(descriptor),
         threshold: separate(&yes, &no),
         right: yes.len(),
         wrong: no.len(),

@@ -23,6 +23,8 @@ use crate::target::{self, Named};
 pub struct Comparison {
     /// One row a query, choice of coefficients and method.
     pub rows: Vec<Row>,
+    /// The rotation spectrum on each query.
+    pub rotation: Vec<Row>,
     /// Agreement of modes with labels; empty without labels.
     pub modes: Vec<ModesAgreement>,
     /// How labels were joined to runs, and what was left over.
@@ -95,16 +97,16 @@ pub fn compare(loaded: &Loaded, labels: Option<&Table>, threshold: Threshold) ->
     };
     let arena = |select| Arena::new(loaded, rows, &judge, select, threshold);
     let arenas = [(Select::Coordinates, arena(Select::Coordinates)?), (Select::Difference, arena(Select::Difference)?)];
-    let mut result = Vec::new();
+    let (mut result, mut rotation) = (Vec::new(), Vec::new());
     for query in &judge.queries {
         for (select, arena) in &arenas {
             result.extend(judge_query(loaded, arena, query, *select, threshold)?);
         }
         let turned = &arenas[0].1;
-        result.push(turned.row(query, Method::Rotation, ROTATION.0, ROTATION.1, turned.spectra[0].len(), None));
+        rotation.push(turned.row(query, Method::Rotation, ROTATION.0, ROTATION.1, turned.spectra[0].len(), None));
     }
     let modes = if labels.is_some() { agreements(loaded, rows, &judge)? } else { Vec::new() };
-    Ok(Comparison { rows: result, modes, notes })
+    Ok(Comparison { rows: result, rotation, modes, notes })
 }
 
 /// Labels by row, and which rows are asked about.

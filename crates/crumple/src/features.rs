@@ -8,7 +8,7 @@
 use crate::Error;
 use crate::basis::Basis;
 use crate::descriptor::{Descriptor, Selected};
-use crate::rotation::Ruler;
+use crate::rotation::{OCTAVES, Ruler};
 use crate::select::{Kind, Select};
 use crate::study::{Coefficients, Function, Need, Rows, Stored, Study, column_name, triples};
 
@@ -25,6 +25,8 @@ enum Block {
     Values { offset: Vec<f64>, scale: f64, frequencies: Vec<f64> },
     /// The rotation spectrum.
     Spectrum(Ruler),
+    /// Its kind alone.
+    Kind(Ruler),
 }
 
 impl Features {
@@ -35,16 +37,19 @@ impl Features {
     pub fn of(basis: &Basis, descriptor: &Descriptor, kind: Kind) -> Result<Self, Error> {
         match kind {
             Kind::Rotation => {
-                let (features, found) = (Self::rotation(basis), descriptor.spectrum.direction.len());
-                let expected = Ruler::of(basis).directions();
-                if found == expected {
-                    return Ok(features);
+                let (mut features, ruler) = (Self::rotation(basis), Ruler::of(basis));
+                let (found, expected) = (descriptor.spectrum.direction.len(), ruler.directions());
+                if found == 0 {
+                    // A descriptor of another part: its direction means nothing here.
+                    features.blocks = vec![Block::Kind(ruler)];
+                } else if found != expected {
+                    return Err(Error::Value {
+                        name: "descriptor",
+                        value: format!("a direction of {found} triples"),
+                        expected: format!("{expected} in this study"),
+                    });
                 }
-                Err(Error::Value {
-                    name: "descriptor",
-                    value: format!("a direction of {found} triples"),
-                    expected: format!("{expected} in this study"),
-                })
+                Ok(features)
             }
             Kind::Paper => {
                 let blocks: Vec<Block> =
@@ -97,6 +102,7 @@ impl Features {
                 stored.values.iter().zip(offset).map(|(&x, offset)| (f64::from(x) + offset) * scale).collect()
             }
             Block::Spectrum(ruler) => ruler.spectrum(&triples(stored.values), stored.rms).numbers(),
+            Block::Kind(ruler) => ruler.spectrum(&triples(stored.values), stored.rms).kind,
         };
         self.blocks.iter().zip(stored).flat_map(numbers).collect::<Vec<f64>>()
     }
@@ -104,7 +110,7 @@ impl Features {
     /// The numbers of a descriptor's target.
     pub fn target(&self, descriptor: &Descriptor) -> Vec<f64> {
         match self.blocks.first() {
-            Some(Block::Spectrum(_)) => descriptor.spectrum.numbers(),
+            Some(Block::Spectrum(_) | Block::Kind(_)) => descriptor.spectrum.numbers(),
             _ => descriptor
                 .blocks()
                 .flat_map(|selected| selected.values.iter().flatten().map(move |x| x * selected.scale))
@@ -126,6 +132,7 @@ impl Features {
                     .collect()
             }
             Block::Spectrum(ruler) => ruler.names(),
+            Block::Kind(ruler) => ruler.names()[..OCTAVES].to_vec(),
         };
         self.blocks.iter().zip(&self.needs).flat_map(of).collect::<Vec<String>>()
     }
@@ -134,7 +141,7 @@ impl Features {
     pub(crate) fn frequencies(&self) -> Option<Vec<f64>> {
         let of = |block: &Block| match block {
             Block::Values { frequencies, .. } => Some(frequencies.clone()),
-            Block::Spectrum(_) => None,
+            Block::Spectrum(_) | Block::Kind(_) => None,
         };
         Some(self.blocks.iter().map(of).collect::<Option<Vec<_>>>()?.concat())
     }

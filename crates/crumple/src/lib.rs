@@ -22,9 +22,11 @@
 //! | other methods on the same data | [`rivals`] | displacements | PCA |
 //! | the coefficients that matter | [`descriptor`] | one state | [`descriptor::Descriptor`] |
 //! | the numbers that are compared | [`features`] | a descriptor, coefficients | a few numbers |
+//! | a descriptor of another study | [`transfer`] | two studies | a descriptor, its direction carried over |
 //! | how alike | [`similarity`] | a descriptor, coefficients | a ranking |
 //! | from which similarity on | [`calibrate`] | a descriptor, known runs | a threshold, its error rates |
 //! | which mode, or none | [`classify`] | modes, a state | [`classify::Verdict`] |
+//! | why they are alike | [`explain`] | two states | terms, regions, words |
 //! | judged against labels | [`compare`] | labels | precision, average precision |
 //! | tables and arrays for others | [`export`] | a study | npy, CSV, Parquet, OBJ, STL |
 //! | one page for a person | [`report`] | a study | HTML |
@@ -39,6 +41,7 @@ pub mod compare;
 pub mod deck;
 pub mod descriptor;
 mod error;
+pub mod explain;
 pub mod export;
 pub mod features;
 pub mod field;
@@ -56,6 +59,7 @@ pub mod select;
 pub mod similarity;
 pub mod study;
 pub mod target;
+pub mod transfer;
 mod vector;
 
 pub use error::Error;

@@ -119,6 +119,9 @@ impl Measures {
     ];
 }
 
+/// A sharp fold or two lie within this share of the edges; a surface that is torn or inside out does not.
+const TURNED_OVER_MAX: f64 = 0.05;
+
 /// States are projected in batches of at most this many bytes of shapes, displacements and rotations.
 const BATCH_BYTES: usize = 256 << 20;
 
@@ -181,6 +184,7 @@ impl<'a> Projector<'a> {
         }
         if let Some(last) = states.last() {
             warnings.extend(last.measures.warnings());
+            warnings.extend(self.surface_warnings(run, &placement, states.len() - 1, &last.measures)?);
         }
         Ok(Projected {
             run: run.id().to_owned(),
@@ -189,6 +193,43 @@ impl<'a> Projector<'a> {
             warnings,
             spent,
         })
+    }
+
+    /// What happened to the surface that a rotation field of it cannot tell, in words.
+    fn surface_warnings(
+        &self,
+        run: &Run,
+        placement: &Placement,
+        state: usize,
+        measures: &Measures,
+    ) -> Result<Vec<String>, Error> {
+        let mut warnings = Vec::new();
+        let (mesh, shape) = (&self.reference.mesh, self.reference.shape(run, placement, state)?);
+        let deleted = run.deleted_shells(state)?.map_or(0, |deleted| {
+            let mut shells = placement.shell_of_triangle.clone();
+            shells.dedup();
+            shells.iter().filter(|&&shell| deleted.get(shell as usize) == Some(&true)).count()
+        });
+        if deleted > 0 {
+            warnings.push(format!("{deleted} shells of the surface are deleted in the last state; they count by where their nodes are, which may fly apart"));
+        }
+        let health = rotation::health(mesh.triangles(), mesh.vertices(), &shape);
+        if health.without_area > 0 {
+            warnings.push(format!(
+                "{} faces have lost their area in the last state; they have no rotation and are left out of it",
+                health.without_area
+            ));
+        }
+        if health.turned_over > TURNED_OVER_MAX {
+            warnings.push(format!(
+                "{:.0} % of the edges are folded over by more than 150 degrees in the last state: the surface is torn or turned inside out there, and its rotation means little",
+                100.0 * health.turned_over
+            ));
+        }
+        if measures.turn < rotation::TURN_MIN && measures.rms > 0.0 {
+            warnings.push("it moved, but did not deform: its surface turned as a whole or not at all".into());
+        }
+        Ok(warnings)
     }
 
     /// Projects one state of a run that may still be growing.
@@ -307,7 +348,7 @@ impl Measures {
         let mut warnings = Vec::new();
         if self.rigid_share > 0.5 {
             warnings.push(format!(
-                "{:.0} % of the displacement is a rigid motion of the whole part; similarities then speak of where it went more than of how it deformed",
+                "{:.0} % of the displacement is a rigid motion of the whole part; the paper's similarities then speak of where it went more than of how it deformed",
                 100.0 * self.rigid_share
             ));
         }

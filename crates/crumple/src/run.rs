@@ -17,6 +17,7 @@ use crate::field::{Field, Layer, Quantity};
 pub struct Run {
     id: String,
     path: PathBuf,
+    node_ids: Vec<u64>,
     source: Source,
     /// Titles and welds: the deck itself, or one that belongs to the result file.
     deck: Option<Arc<Deck>>,
@@ -146,11 +147,13 @@ impl Run {
         if deck::is_deck(path) {
             let deck = Arc::new(deck::read(path)?);
             let source = Source::Deck { deck: Arc::clone(&deck), surface: Surface::of(&deck) };
-            return Ok(Self { id: id.into(), path: path.to_owned(), source, deck: Some(deck) });
+            let node_ids = deck.node_ids.clone();
+            return Ok(Self { id: id.into(), path: path.to_owned(), node_ids, source, deck: Some(deck) });
         }
         let family = d3plot::Family::open(path)?;
+        let node_ids = (0..family.header().nodes).map(|node| family.geometry().node_id(node)).collect();
         let path = family.root().to_owned();
-        Ok(Self { id: id.into(), path, source: Source::D3plot(Box::new(family)), deck: None })
+        Ok(Self { id: id.into(), path, node_ids, source: Source::D3plot(Box::new(family)), deck: None })
     }
 
     /// The same run with the titles and welds of a deck.
@@ -198,10 +201,7 @@ impl Run {
 
     /// User ids of the nodes.
     pub fn node_ids(&self) -> &[u64] {
-        match &self.source {
-            Source::D3plot(family) => &family.geometry().node_ids,
-            Source::Deck { deck, .. } => &deck.node_ids,
-        }
+        &self.node_ids
     }
 
     /// Undeformed node positions, nodes × 3, in the model's length unit.
@@ -337,6 +337,17 @@ impl Run {
         }
     }
 
+    /// Which shells are deleted in one state, in the order of [`Run::faces`]; `None` where the file does not tell.
+    ///
+    /// # Errors
+    /// [`Error::Read`] if the file cannot be read there.
+    pub fn deleted_shells(&self, state: usize) -> Result<Option<Vec<bool>>, Error> {
+        match &self.source {
+            Source::D3plot(family) => Ok(family.deleted_shells(state)?),
+            Source::Deck { .. } => Ok(None),
+        }
+    }
+
     /// A field in one state.
     ///
     /// # Errors
@@ -353,6 +364,11 @@ impl Run {
         };
         let values = match field.quantity {
             Quantity::PlasticStrain => family.shell_plastic_strain(state, layers)?.map(FieldValues::Shells),
+            Quantity::VonMises => family.values(state, "shell_stress")?.map(|stress| {
+                FieldValues::Shells(stress.rows().map(|points| von_mises(points, field.layer)).collect())
+            }),
+            Quantity::Thickness => family.values(state, "shell_thickness")?.map(first_column),
+            Quantity::InternalEnergy => family.values(state, "shell_internal_energy")?.map(first_column),
             Quantity::Temperature => family
                 .temperature(state)?
                 .map(|values| FieldValues::Nodes(values.into_iter().map(|x| [x, 0.0, 0.0]).collect())),
@@ -360,5 +376,40 @@ impl Run {
             Quantity::Acceleration => family.acceleration(state)?.map(FieldValues::Nodes),
         };
         values.ok_or_else(|| missing(family.fields().iter().map(|field| field.name).collect::<Vec<_>>().join(", ")))
+    }
+}
+
+fn first_column(table: d3plot::Table) -> FieldValues {
+    FieldValues::Shells(table.rows().map(|row| row[0]).collect())
+}
+
+/// Von Mises stress of one layer of a shell, or over its layers. `points`: (xx, yy, zz, xy, yz, zx) of each layer; three
+/// layers are mid, inner, outer, as LS-DYNA writes them.
+fn von_mises(points: &[f64], layer: Layer) -> f64 {
+    let of = |&[xx, yy, zz, xy, yz, zx]: &[f64; 6]| {
+        let normal = (xx - yy).powi(2) + (yy - zz).powi(2) + (zz - xx).powi(2);
+        (normal / 2.0 + 3.0 * (xy * xy + yz * yz + zx * zx)).sqrt()
+    };
+    let each: Vec<f64> = points.as_chunks().0.iter().map(of).collect();
+    match layer {
+        Layer::Max => each.iter().copied().fold(f64::NAN, f64::max),
+        Layer::Min => each.iter().copied().fold(f64::NAN, f64::min),
+        Layer::Mean => each.iter().sum::<f64>() / each.len() as f64,
+        Layer::Inner => each.get(1).copied().unwrap_or(f64::NAN),
+        Layer::Outer => each.get(2).copied().unwrap_or(f64::NAN),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn von_mises_of_tension_and_of_shear() {
+        let points = [300.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 100.0, 0.0, 0.0, 5.0, 5.0, 5.0, 0.0, 0.0, 0.0];
+        assert_eq!(von_mises(&points, Layer::Max), 300.0);
+        assert_eq!(von_mises(&points, Layer::Inner), 3_f64.sqrt() * 100.0);
+        assert_eq!((von_mises(&points, Layer::Outer), von_mises(&points, Layer::Min)), (0.0, 0.0));
+        assert!(von_mises(&points[..6], Layer::Outer).is_nan(), "one layer has no outer one");
     }
 }

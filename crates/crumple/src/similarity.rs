@@ -20,7 +20,8 @@ use crate::target::Target;
 /// What is compared, and how.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SimilarityOptions {
-    /// Which numbers are compared. Default: the descriptor's own kind.
+    /// Which numbers are compared. Default: the descriptor's own kind, or the paper's where a weight or measure is asked
+    /// for that only its coefficients have.
     pub kind: Option<Kind>,
     /// Subtract the mean of the last states of all runs first. Default: no, as in the paper.
     pub centred: bool,
@@ -28,6 +29,15 @@ pub struct SimilarityOptions {
     pub weight: Weight,
     /// The measure. Default: cosine, the paper's.
     pub metric: Metric,
+}
+
+impl SimilarityOptions {
+    /// Which of a descriptor's numbers are compared.
+    pub fn kind_for(&self, descriptor: &Descriptor) -> Kind {
+        // An eigenvalue of its own, and a length.
+        let only_paper = self.weight == Weight::Frequency || self.metric == Metric::Euclidean;
+        self.kind.unwrap_or(if only_paper { Kind::Paper } else { descriptor.kind })
+    }
 }
 
 /// Weights of the coefficients before they are compared.
@@ -102,9 +112,9 @@ impl Comparer {
     /// [`Error::TooFewRuns`] where the options need the study's statistics and there are fewer than two runs;
     /// [`Error::Value`] for a weight that the kind does not have.
     pub fn new(loaded: &Loaded, descriptor: &Descriptor, options: SimilarityOptions) -> Result<Self, Error> {
-        let SimilarityOptions { kind, centred, weight, metric } = options;
+        let SimilarityOptions { centred, weight, metric, .. } = options;
         let basis = &loaded.basis;
-        let kind = kind.unwrap_or(descriptor.kind);
+        let kind = options.kind_for(descriptor);
         let features = Features::of(basis, descriptor, kind)?;
         let target = features.target(descriptor);
         let needs_study = centred || weight == Weight::Spread || metric == Metric::Mahalanobis;

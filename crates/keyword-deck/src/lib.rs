@@ -42,6 +42,7 @@ mod error;
 mod expression;
 mod files;
 mod include;
+mod keyword;
 mod lines;
 mod number;
 mod parameter;

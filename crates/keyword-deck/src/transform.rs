@@ -72,7 +72,7 @@ pub(crate) fn affine(steps: &[Step], nodes: &dyn Fn(u64) -> Option<Point>) -> Re
             }
             "TRANSL" => Affine { shift: [a[0], a[1], a[2]], ..Affine::IDENTITY },
             "SCALE" => Affine::scale([a[0], a[1], a[2]].map(|factor| if factor == 0.0 { 1.0 } else { factor })),
-            // By two POINTs: their ids and the angle; else direction, point and angle.
+            // By two points: their ids and the angle; else direction, point and angle.
             "ROTATE" if a[3..].iter().all(|x| *x == 0.0) && points.contains_key(&(a[0] as i64)) => {
                 let (from, to) = (point(a[0])?, point(a[1])?);
                 rotation(sub(to, from), from, a[2])?

@@ -1,6 +1,6 @@
 //! Joining components that belong together but share no vertices, such as spot-welded sheets.
 //!
-//! Mutually nearest vertices of different components become one degree of freedom: the field takes one value on
+//! Ties by what a model says are the general case ([`Tie`](crate::Tie)). Mutually nearest vertices of different components become one degree of freedom: the field takes one value on
 //! both, so the spectrum is that of one connected surface. The geometry is not moved and no area is lost.
 
 use thiserror::Error;

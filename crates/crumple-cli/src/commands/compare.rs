@@ -40,7 +40,7 @@ impl Compare {
 }
 
 fn words(comparison: &Comparison, unit: &str) -> String {
-    let rows = comparison.rows.iter().map(|row| {
+    let rows = comparison.rows.iter().chain(&comparison.rotation).map(|row| {
         vec![
             row.label.clone(),
             row.query.clone(),

@@ -7,6 +7,7 @@ mod classify;
 mod compare;
 mod describe;
 mod distance;
+mod explain;
 mod export;
 mod info;
 mod init;
@@ -50,6 +51,8 @@ pub(crate) enum Command {
     Verify(verify::Verify),
     /// Which mode each run belongs to, with a margin, or none. Exit code 1 if one has none
     Classify(classify::Classify),
+    /// Why two runs are alike or different: at which wavelengths, which way, and where on the part
+    Explain(explain::Explain),
     /// One number for an optimiser: how far a run is from a descriptor
     Distance(distance::Distance),
     /// The shape from a descriptor, from the first M eigenvectors or from principal components, as a file
@@ -76,6 +79,7 @@ impl Command {
             Self::Search(command) => command.run(output),
             Self::Verify(command) => command.run(output),
             Self::Classify(command) => command.run(output),
+            Self::Explain(command) => command.run(output),
             Self::Distance(command) => command.run(output),
             Self::Reconstruct(command) => command.run(output),
             Self::Export(command) => command.run(output),

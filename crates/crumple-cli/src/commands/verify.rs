@@ -73,7 +73,7 @@ impl Verify {
         let comparer = Comparer::new(&loaded, &descriptor, options)?;
         // A calibration is for the numbers and the measure that it was made with.
         let plain = SimilarityOptions { kind: options.kind, ..Default::default() };
-        let kind = options.kind.unwrap_or(descriptor.kind);
+        let kind = options.kind_for(&descriptor);
         let calibration = descriptor.calibration.as_ref().filter(|found| found.kind == kind && options == plain);
         let threshold = self.threshold.or(calibration.map(|found| found.threshold)).unwrap_or(0.9);
         let judge = |run: &String| {

@@ -134,7 +134,8 @@ pub fn find(loaded: &Loaded, word: &str, only: Option<&[usize]>) -> Result<Descr
                 other => Some(other?),
             };
             if let Some(mode) = modes.as_ref().and_then(|modes| modes.mode(word).ok()) {
-                return of_run(&Named { run: mode.medoid.clone(), state: None });
+                let described = of_run(&Named { run: mode.medoid.clone(), state: None })?;
+                return Ok(Descriptor { name: mode.name.clone(), mode: Some(mode.name.clone()), ..described });
             }
             let named = Named::in_study(study, word);
             if study.manifest().runs.contains_key(&named.run) || Path::new(&named.run).exists() {

@@ -49,7 +49,7 @@ pub const RUNS_MIN: usize = 3;
 /// The largest number of modes that is tried when none is given.
 pub const COUNT_MAX: usize = 8;
 /// Numbers of groups whose stability is within this of the best count as equally stable.
-const EQUALLY_STABLE: f64 = 0.02;
+const EQUALLY_STABLE: f64 = 0.01;
 /// Groups that come back worse than this are doubtful.
 pub const STABLE: f64 = 0.75;
 
@@ -155,6 +155,11 @@ pub fn modes(study: &Study, options: &ModesOptions, watch: &dyn Watch) -> Result
     if study.manifest().runs.len() < RUNS_MIN {
         let have = study.manifest().runs.len();
         return Err(Error::TooFewRuns { what: "grouping into modes", needed: RUNS_MIN, have });
+    }
+    if let By::Field(field) = options.by
+        && !study.settings().fields.contains(&field)
+    {
+        return Err(crate::target::unknown_field(field, study.settings().fields.iter().copied()));
     }
     let sampled = states::sample(study, options.by, &options.states, area)?;
     let runs = sampled.runs.len();
@@ -280,7 +285,7 @@ impl Modes {
     /// Unit of distances and spreads; empty where they have none.
     pub fn unit<'a>(&self, length_unit: &'a str) -> &'a str {
         match self.by {
-            By::Rotation => "",
+            By::Rotation | By::Field(_) => "",
             By::Displacement | By::Coordinates => length_unit,
         }
     }

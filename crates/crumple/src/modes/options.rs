@@ -6,6 +6,7 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 
 use crate::Error;
+use crate::field::Field;
 use crate::study::Function;
 
 /// How to group.
@@ -55,6 +56,8 @@ pub enum By {
     /// The coordinates themselves, α = α⁰ + δ. All runs share α⁰, so distances, and with them the modes, are those of the
     /// displacement.
     Coordinates,
+    /// A field that the study keeps: all its K coefficients, in its own unit.
+    Field(Field),
 }
 
 impl By {
@@ -63,6 +66,7 @@ impl By {
         match self {
             Self::Rotation => Function::Rotation,
             Self::Displacement | Self::Coordinates => Function::Displacement,
+            Self::Field(field) => Function::Field(field),
         }
     }
 }
@@ -159,7 +163,15 @@ impl FromStr for By {
     fn from_str(text: &str) -> Result<Self, Error> {
         let words =
             [("rotation", Self::Rotation), ("displacement", Self::Displacement), ("coordinates", Self::Coordinates)];
-        one_of("--by", text, &words)
+        match words.iter().find(|(word, _)| *word == text) {
+            Some((_, by)) => Ok(*by),
+            None if text == "paper" => Ok(Self::Displacement),
+            None => text.parse().map(Self::Field).map_err(|_| Error::Value {
+                name: "--by",
+                value: text.to_owned(),
+                expected: "rotation, displacement (or paper), coordinates, or a field such as plastic_strain".into(),
+            }),
+        }
     }
 }
 

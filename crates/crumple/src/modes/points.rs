@@ -20,7 +20,7 @@ impl Points {
     pub(super) fn of(by: By, rows: &Coefficients, per_run: usize, basis: &Basis) -> Self {
         match by {
             By::Rotation => Self::by_rotation(rows, per_run, &Ruler::of(basis)),
-            By::Displacement | By::Coordinates => Self::in_lengths(rows, per_run, basis.facts.area),
+            By::Displacement | By::Coordinates | By::Field(_) => Self::in_lengths(rows, per_run, basis.facts.area),
         }
     }
 
@@ -32,7 +32,7 @@ impl Points {
     /// Coefficients divided by √area, so that distances are RMS distances, over the surface and over the states of a run.
     fn in_lengths(rows: &Coefficients, per_run: usize, area: f64) -> Self {
         let scale = 1.0 / (area * per_run as f64).sqrt();
-        let (count, width) = (rows.rows() / per_run, 3 * rows.eigenvectors.len() * per_run);
+        let (count, width) = (rows.rows() / per_run, rows.width() * per_run);
         let values: Vec<f64> = rows.values.iter().map(|&x| f64::from(x) * scale).collect();
         if count >= width {
             return Self { count, width, values };

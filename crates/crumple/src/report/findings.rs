@@ -13,6 +13,7 @@ use super::shapes::{MeshData, plain, shapes, z_displacement};
 use super::words::{deck_words, isometry_words, join_words, mode_words, warnings};
 use crate::Error;
 use crate::descriptor::{self, DescribeOptions, Described, FIRST_M, Rival, Threshold, describe};
+use crate::explain::spectrum_words;
 use crate::joints::Join;
 use crate::modes::{By, Mode, Modes, Tried};
 use crate::reconstruct::Errors;
@@ -358,7 +359,11 @@ fn mode_data(
         silhouette: mode.silhouette,
         spread: mode.spread,
         color,
-        words: mode_words(loaded, &described.original),
+        words: format!(
+            "{}; {}",
+            mode_words(loaded, &described.original),
+            spectrum_words(&loaded.basis, &descriptor.spectrum, &loaded.study.settings().length_unit)
+        ),
         picture: format!("data:image/png;base64,{}", base64::engine::general_purpose::STANDARD.encode(png)),
         descriptor: DescriptorData {
             select: selected.select.word(),

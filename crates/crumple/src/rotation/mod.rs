@@ -14,7 +14,10 @@
 
 mod spectrum;
 
+pub(crate) use spectrum::TURN_MIN;
 pub use spectrum::{OCTAVES, RotationSpectrum, Ruler};
+
+use std::collections::HashMap;
 
 use faer::{Mat, Side};
 
@@ -45,6 +48,37 @@ pub fn field(triangles: &[[u32; 3]], undeformed: &[Vector], shape: &[Vector]) ->
         }
     }
     sum.iter().zip(&areas).map(|(sum, &area)| if area > 0.0 { sum.map(|x| x / area) } else { *sum }).collect()
+}
+
+/// What makes a rotation field doubtful.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Health {
+    /// Faces that had an area and have none.
+    pub without_area: usize,
+    /// Share of the inner edges across which the surface turned by more than 150 degrees.
+    pub turned_over: f64,
+}
+
+/// Looks at the faces one by one. `undeformed`, `shape`: N × 3.
+pub fn health(triangles: &[[u32; 3]], undeformed: &[Vector], shape: &[Vector]) -> Health {
+    let has_area = |face: [u32; 3], points: &[Vector]| frame(face.map(|vertex| points[vertex as usize])).is_some();
+    let turned: Vec<Option<Matrix>> =
+        triangles.iter().map(|face| turn(*face, undeformed, shape).map(|(rotation, _)| rotation)).collect();
+    let lost = |face: &&[u32; 3]| has_area(**face, undeformed) && !has_area(**face, shape);
+    let mut face_at: HashMap<(u32, u32), usize> = HashMap::new();
+    let (mut inner, mut over) = (0_usize, 0_usize);
+    for (at, &[a, b, c]) in triangles.iter().enumerate() {
+        for (from, to) in [(a, b), (b, c), (c, a)] {
+            let Some(other) = face_at.insert((from.min(to), from.max(to)), at) else { continue };
+            if let (Some(one), Some(other)) = (&turned[at], &turned[other]) {
+                inner += 1;
+                // tr(R₁ᵀ R₂) = 1 + 2 cos θ.
+                let trace: f64 = one.iter().zip(other).map(|(x, y)| dot(*x, *y)).sum();
+                over += usize::from(trace < 1.0 + 2.0 * (5.0 * std::f64::consts::FRAC_PI_6).cos());
+            }
+        }
+    }
+    Health { without_area: triangles.iter().filter(lost).count(), turned_over: over as f64 / inner.max(1) as f64 }
 }
 
 /// The rotation of a face and its undeformed area; `None` where it has none, before or after.

@@ -20,7 +20,7 @@ pub const OCTAVES: usize = 9;
 
 /// A root mean square of sin θ below this is rounding of single-precision files, not a turn: positions 3 m from the
 /// origin are rounded to 5e-5 of a shell of 5 mm.
-const TURN_MIN: f64 = 1e-4;
+pub(crate) const TURN_MIN: f64 = 1e-4;
 
 /// Kind and direction of a deformation in a few numbers.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -116,8 +116,18 @@ impl Ruler {
         }
         let count = OCTAVES as f64;
         let kind = (0..).zip(below).map(|(at, below)| (below - (f64::from(at) + 0.5) / count) / count.sqrt()).collect();
-        let direction = rho.iter().zip(&self.weights).map(|(rho, weight)| rho.map(|x| weight * x / energy.sqrt()));
-        RotationSpectrum { turn, octaves, kind, direction: direction.collect() }
+        RotationSpectrum { turn, octaves, kind, direction: self.direction(rho, energy.sqrt()) }
+    }
+
+    /// w_j ρ_j / √E of the longest waves.
+    pub(crate) fn direction(&self, rho: &[Vector], root_energy: f64) -> Vec<Vector> {
+        let scale = if root_energy > 0.0 { 1.0 / root_energy } else { 0.0 };
+        rho.iter().zip(&self.weights).map(|(rho, weight)| rho.map(|x| weight * x * scale)).collect()
+    }
+
+    /// Eigenvectors, counted from 1, whose frequency lies in an octave.
+    pub(crate) fn eigenvectors_of(&self, octave: usize) -> Vec<usize> {
+        (1..=self.octave.len()).filter(|j| self.octave[j - 1] == Some(octave)).collect()
     }
 
     /// Names of the numbers that are compared.

@@ -1,5 +1,7 @@
 //! The walk through a deck and its includes: lines become cards, cards blocks, blocks the deck.
 
+mod includes;
+
 use std::collections::HashMap;
 use std::io::Read;
 use std::ops::Range;
@@ -12,56 +14,15 @@ use crate::deck::{Deck, DeckFile, place};
 use crate::error::Error;
 use crate::files::Files;
 use crate::include::Include;
+use crate::keyword::{format_of_file, is_keyword, keyword_of};
 use crate::lines::{LINE_MAX, Lines, Stop};
 use crate::parameter::Parameters;
-use crate::row::{At, Card, Format, decode, short};
-use crate::transform::{Affine, Step, affine};
+use crate::row::{At, Card, Format, short};
+use crate::transform::Step;
 use crate::warning::Warning;
 
-/// Includes inside each other.
-const DEPTH_MAX: usize = 64;
-/// Includes in all: two files that include each other's neighbours many times must not run for ever.
-const INCLUDES_MAX: usize = 10_000;
 /// Lines of something else that may stand in front of the first keyword.
 const JUNK_MAX: u64 = 100;
-
-/// First words of LS-DYNA's keywords: what tells a deck without *KEYWORD from another text.
-const FAMILIES: &[&str] = &[
-    "KEYWORD",
-    "NODE",
-    "ELEMENT",
-    "PART",
-    "SECTION",
-    "MAT",
-    "SET",
-    "DEFINE",
-    "INCLUDE",
-    "PARAMETER",
-    "CONTROL",
-    "DATABASE",
-    "CONTACT",
-    "CONSTRAINED",
-    "BOUNDARY",
-    "LOAD",
-    "INITIAL",
-    "RIGIDWALL",
-    "AIRBAG",
-    "ALE",
-    "EOS",
-    "HOURGLASS",
-    "DAMPING",
-    "DEFORMABLE",
-    "TITLE",
-    "COMMENT",
-    "CASE",
-    "CHANGE",
-    "INTERFACE",
-    "PERTURBATION",
-    "SENSOR",
-    "TERMINATION",
-    "USER",
-    "END",
-];
 
 /// Reads the deck whose main file is at `root`.
 pub(crate) fn read(files: &dyn Files, root: &Path) -> Result<Deck, Error> {
@@ -334,129 +295,6 @@ impl Reader<'_> {
         }
         include.map_or(Ok(()), |include| self.include(include, block, file, frame))
     }
-
-    fn include(&mut self, include: Include, block: &Current, file: &Arc<Path>, frame: &Frame) -> Result<(), Error> {
-        let beside = file.parent().unwrap_or(Path::new(""));
-        match include {
-            Include::Paths { folders, relative } => {
-                let from = if relative { beside } else { &self.folder };
-                let folders: Vec<PathBuf> = folders.iter().map(|folder| from.join(native(folder))).collect();
-                self.paths.extend(folders);
-                Ok(())
-            }
-            Include::NotFollowed => {
-                self.deck.warnings.push(Warning::NotFollowed {
-                    place: place(file, block.line),
-                    keyword: block.keyword.clone(),
-                    what: "what the file holds is not in the mesh",
-                });
-                Ok(())
-            }
-            Include::Files { names, change } => {
-                for (name, line) in names {
-                    let name = name.trim_matches('"').to_owned();
-                    let found = self.find(&name, beside);
-                    let here = place(file, line);
-                    match found {
-                        Err(searched) => {
-                            self.deck.warnings.push(Warning::MissingInclude { place: here, name, searched })
-                        }
-                        Ok(path) => self.included(&path, name, here, change.as_ref(), block.format, frame)?,
-                    }
-                }
-                Ok(())
-            }
-        }
-    }
-
-    /// Looks for an included file: beside the main file, beside the file that includes it, then along *INCLUDE_PATH.
-    fn find(&self, name: &str, beside: &Path) -> Result<PathBuf, Vec<PathBuf>> {
-        let name = native(name);
-        let mut searched = Vec::new();
-        let folders = [self.folder.as_path(), beside].into_iter().chain(self.paths.iter().map(PathBuf::as_path));
-        for folder in folders {
-            let path = folder.join(&name);
-            if self.files.exists(&path) {
-                return Ok(path);
-            }
-            if !searched.contains(&path) {
-                searched.push(path);
-            }
-        }
-        Err(searched)
-    }
-
-    fn included(
-        &mut self,
-        path: &Path,
-        name: String,
-        here: crate::Place,
-        change: Option<&crate::include::Change>,
-        format: Format,
-        frame: &Frame,
-    ) -> Result<(), Error> {
-        let identity = self.files.identity(path);
-        if let Some(first) = self.stack.iter().position(|(there, _)| *there == identity) {
-            let mut chain: Vec<PathBuf> = self.stack[first..].iter().map(|(_, path)| path.clone()).collect();
-            chain.push(path.to_owned());
-            return Err(Error::IncludesItself { place: here, chain });
-        }
-        self.includes += 1;
-        if self.includes > INCLUDES_MAX || self.stack.len() >= DEPTH_MAX {
-            return Err(Error::TooManyIncludes { place: here, most: INCLUDES_MAX });
-        }
-        let inner = change.map_or_else(|| frame.clone(), |change| change.inside(frame));
-        let first = self.deck.node_ids.len();
-        // A file says by its own *KEYWORD how wide its fields are; one of a long deck that says nothing may be long.
-        let inherited = if format == Format::Long { Format::Guess } else { Format::Standard };
-        match self.file(path, &inner, inherited) {
-            Err(
-                error @ (Error::NotADeck { .. } | Error::Packed { .. } | Error::Io { .. } | Error::LineTooLong { .. }),
-            ) => {
-                let why = error.to_string();
-                self.deck.warnings.push(Warning::UnreadableInclude { place: here.clone(), name, why });
-            }
-            other => other?,
-        }
-        let nodes = first..self.deck.node_ids.len();
-        if let Some(change) = change
-            && (change.length != 1.0 || change.transformation != 0)
-        {
-            let transformation = change.transformation;
-            self.moves.push(Move { nodes, length: change.length, transformation, include: here });
-        }
-        Ok(())
-    }
-
-    /// Puts the nodes of includes where they belong, and looks the whole deck over.
-    fn finish(mut self) -> Result<Deck, Error> {
-        let needs_nodes = self.moves.iter().any(|step| step.transformation != 0);
-        let place_of: HashMap<u64, usize> = match needs_nodes {
-            true => self.deck.node_ids.iter().copied().zip(0..).collect(),
-            false => HashMap::new(),
-        };
-        for step in std::mem::take(&mut self.moves) {
-            let scale = Affine::scale([step.length; 3]);
-            let nodes = |id: u64| place_of.get(&id).map(|&at| self.deck.coordinates[at]);
-            let found = match step.transformation {
-                0 => Ok(Affine::IDENTITY),
-                id => match self.transformations.get(&id) {
-                    Some(steps) => affine(steps, &nodes),
-                    None => Err(format!("the transformation {id} is not defined")),
-                },
-            };
-            match found {
-                Ok(map) => {
-                    let map = scale.then(&map);
-                    self.deck.coordinates[step.nodes].iter_mut().for_each(|point| *point = map.apply(*point));
-                }
-                Err(what) => self.deck.warnings.push(Warning::NotTransformed { place: step.include, what }),
-            }
-        }
-        self.deck.parameters = self.parameters.len();
-        crate::check::look_over(&mut self.deck);
-        Ok(self.deck)
-    }
 }
 
 /// Passes a byte order mark of UTF-8; refuses what is no text.
@@ -477,42 +315,4 @@ fn skip_mark(lines: &mut Lines<Box<dyn Read + '_>>, path: &Path, root: bool) -> 
         _ => return Ok(()),
     };
     Err(Error::Packed { path: path.to_owned(), what })
-}
-
-/// The name on a keyword line in upper case, and the letter behind it that says how wide fields are.
-fn keyword_of(line: &[u8]) -> (String, Option<char>) {
-    let text = decode(line[1..].trim_ascii()).to_ascii_uppercase();
-    let mut words = text.split(|c: char| c.is_ascii_whitespace() || c == '$' || c == ',');
-    let name = words.next().unwrap_or_default();
-    let suffix = |word: &str| word.chars().last().filter(|c| matches!(c, '+' | '-' | '%'));
-    match suffix(name) {
-        Some(letter) if name.len() > 1 => (name[..name.len() - 1].to_owned(), Some(letter)),
-        _ => (name.to_owned(), words.find(|word| !word.is_empty()).filter(|word| word.len() == 1).and_then(suffix)),
-    }
-}
-
-/// Whether a line can be the first keyword of a deck.
-fn is_keyword(line: &[u8]) -> bool {
-    let (name, _) = keyword_of(line);
-    let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '-');
-    name.chars().all(plain) && FAMILIES.contains(&name.split('_').next().unwrap_or_default())
-}
-
-/// What *KEYWORD says about the width of fields.
-fn format_of_file(line: &[u8], format: Format) -> Format {
-    let text: String = decode(line).chars().filter(|c| !c.is_whitespace()).collect();
-    if text.contains("LONG=Y") || text.contains("LONG=K") {
-        Format::Long
-    } else if text.contains("LONG=S") {
-        Format::Guess
-    } else if text.contains("I10=Y") {
-        Format::I10
-    } else {
-        format
-    }
-}
-
-/// A path as this system writes it: decks of Windows have backslashes.
-fn native(name: &str) -> PathBuf {
-    if std::path::MAIN_SEPARATOR == '/' { PathBuf::from(name.replace('\\', "/")) } else { PathBuf::from(name) }
 }
