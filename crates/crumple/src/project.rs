@@ -14,7 +14,7 @@ use crate::Error;
 use crate::basis::{Basis, coefficients_of};
 use crate::field::Field;
 use crate::reference::{Placement, Reference};
-use crate::rotation;
+use crate::rotation::{self, Rest};
 use crate::run::Run;
 use crate::vector::{Vector, area, distance, square, subtract};
 
@@ -147,6 +147,7 @@ pub struct Projector<'a> {
     basis: &'a Basis,
     fields: &'a [Field],
     geometry: Geometry<'a>,
+    rest: Rest<'a>,
     /// Where the last run's nodes and shells were: the next run of a bundle mostly has the same mesh.
     placed: Mutex<Option<(blake3::Hash, Arc<Placement>)>>,
 }
@@ -154,7 +155,8 @@ pub struct Projector<'a> {
 impl<'a> Projector<'a> {
     /// Prepares what all runs share. `fields`: projected beside displacement and rotation.
     pub fn new(reference: &'a Reference, basis: &'a Basis, fields: &'a [Field]) -> Self {
-        Self { reference, basis, fields, geometry: Geometry::of(reference, basis), placed: Mutex::default() }
+        let rest = Rest::of(reference.mesh.triangles(), reference.mesh.vertices());
+        Self { reference, basis, fields, geometry: Geometry::of(reference, basis), rest, placed: Mutex::default() }
     }
 
     /// Projects every whole state of a run. Memory is bounded whatever the number of states.
@@ -206,7 +208,7 @@ impl<'a> Projector<'a> {
         measures: &Measures,
     ) -> Result<Vec<String>, Error> {
         let mut warnings = Vec::new();
-        let (mesh, shape) = (&self.reference.mesh, self.reference.shape(run, placement, state)?);
+        let shape = self.reference.shape(run, placement, state)?;
         let deleted = run.deleted_shells(state)?.map_or(0, |deleted| {
             let mut shells = placement.shell_of_triangle.clone();
             shells.dedup();
@@ -215,7 +217,7 @@ impl<'a> Projector<'a> {
         if deleted > 0 {
             warnings.push(format!("{deleted} shells of the surface are deleted in the last state; they count by where their nodes are, which may fly apart"));
         }
-        let health = rotation::health(mesh.triangles(), mesh.vertices(), &shape);
+        let health = self.rest.health(&shape);
         if health.without_area > 0 {
             warnings.push(format!(
                 "{} faces have lost their area in the last state; they have no rotation and are left out of it",
@@ -274,10 +276,7 @@ impl<'a> Projector<'a> {
         let mut measures: Vec<Measures> =
             (0..shapes.len()).map(|at| geometry.measures(&shapes[at], &displacements[at], &deltas[at])).collect();
         clock.lap(&mut spent.displacement);
-        let turned: Vec<Vec<Vector>> = shapes
-            .iter()
-            .map(|shape| rotation::field(reference.mesh.triangles(), reference.mesh.vertices(), shape))
-            .collect();
+        let turned: Vec<Vec<Vector>> = shapes.iter().map(|shape| self.rest.field(shape)).collect();
         let rotations = coefficients_of(basis, &turned);
         measures.iter_mut().zip(&turned).for_each(|(measures, turned)| measures.turn = geometry.turn(turned));
         clock.lap(&mut spent.rotation);

@@ -100,6 +100,20 @@ fn a_deck_cut_or_spoilt_at_any_byte_gives_an_answer() {
     }
 }
 
+#[test]
+fn the_corpus_of_the_fuzz_target_gives_answers() {
+    let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus/deck");
+    let mut seen = 0;
+    for entry in std::fs::read_dir(corpus).unwrap() {
+        let bytes = std::fs::read(entry.unwrap().path()).unwrap();
+        let names = ('a'..='h').map(|name| PathBuf::from(format!("{name}.k")));
+        let files = names.zip(bytes.split(|byte| *byte == 1)).map(|(name, file)| (name, file.to_vec())).collect();
+        let _ = Deck::read_from(&Memory(files), Path::new("a.k"));
+        seen += 1;
+    }
+    assert!(seen >= 4);
+}
+
 fn line() -> impl Strategy<Value = String> {
     prop_oneof![
         "[*](NODE|ELEMENT_(SHELL|SOLID|BEAM|TSHELL|SPH)(_(THICKNESS|COMPOSITE|OFFSET|ORTHO|H20|PID|LONG)){0,2}|PART(_INERTIA|_COMPOSITE)?|SECTION_(SHELL|BEAM|TSHELL)(_TITLE)?|SET_(NODE|SEGMENT|PART|SHELL)(_LIST|_GENERAL|_ADD|_COLUMN|_GENERATE){0,2}(_TITLE)?|MAT_SPOTWELD|CONSTRAINED_(SPOTWELD|NODE_SET|NODAL_RIGID_BODY|RIVET)(_ID|_TITLE)?|CONTACT_TIED(_ID|_MPP)?|INCLUDE(_TRANSFORM|_PATH)?|PARAMETER(_EXPRESSION|_LOCAL|_DUPLICATION)?|DEFINE_TRANSFORMATION|TITLE|KEYWORD LONG=Y|KEYWORD I10=Y|END)[+%-]?",

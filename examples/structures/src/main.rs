@@ -67,3 +67,61 @@ fn write(structure: &dyn Structure, folder: &Path) -> Result<(), Box<dyn Error>>
     println!("{}: {} runs, {} nodes", folder.display(), runs.len(), model.nodes.len());
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use model::{Inputs, Point};
+
+    fn strains(structure: &dyn Structure, shape: &[Point]) -> Vec<f64> {
+        let model = structure.model();
+        let length = |points: &[Point], a: u32, b: u32| {
+            (0..3).map(|c| (points[a as usize][c] - points[b as usize][c]).powi(2)).sum::<f64>().sqrt()
+        };
+        let sides = model.quads.iter().flat_map(|&[a, b, c, d]| [(a, b), (b, c), (c, d), (d, a)]);
+        let mut strains: Vec<f64> =
+            sides.map(|(a, b)| (length(shape, a, b) / length(&model.nodes, a, b) - 1.0).abs()).collect();
+        strains.sort_by(f64::total_cmp);
+        strains
+    }
+
+    fn only(structure: &dyn Structure, mode: &'static str) -> Inputs {
+        let runs = plan::runs(structure);
+        let mut inputs = runs.into_iter().find(|run| run.label == mode && run.clear).expect("a clear run").inputs;
+        structure.modes().iter().filter(|other| **other != mode).for_each(|other| _ = inputs.insert(other, 0.0));
+        inputs
+    }
+
+    #[test]
+    fn nothing_moves_at_share_zero() {
+        let structures: [Box<dyn Structure>; 3] = [Box::new(tube::Tube), Box::new(plate::Plate), Box::new(rail::Rail)];
+        for structure in structures {
+            let (model, inputs) = (structure.model(), only(structure.as_ref(), structure.modes()[0]));
+            for (a, b) in model.nodes.iter().zip(structure.shape(&inputs, 0.0)) {
+                // The axis is integrated, to the order of rounding of its length.
+                assert!((0..3).all(|c| (a[c] - b[c]).abs() < 1e-9 * 1100.0), "{}: {a:?} {b:?}", structure.name());
+            }
+        }
+    }
+
+    #[test]
+    fn folds_and_hinges_hardly_stretch() {
+        // A chord is shorter than its arc: shells of a seventh of a wavelength, turned by up to 1.25 at their ends.
+        for (structure, mode) in [
+            (&tube::Tube as &dyn Structure, "fold"),
+            (&rail::Rail, "fold"),
+            (&plate::Plate, "corrugate"),
+            (&plate::Plate, "hinge"),
+        ] {
+            let strains = strains(structure, &structure.shape(&only(structure, mode), 1.0));
+            let quantile = |share: f64| strains[(share * (strains.len() - 1) as f64) as usize];
+            assert!(quantile(0.5) < 0.01 && quantile(0.8) < 0.05, "{mode}: {} {}", quantile(0.5), quantile(0.8));
+        }
+    }
+
+    #[test]
+    fn the_bundles_are_the_same_everywhere() {
+        let labels: Vec<&str> = plan::runs(&tube::Tube).iter().map(|run| run.label).take(4).collect();
+        assert_eq!(labels, ["twist", "bend_up", "bend_up", "twist"]);
+    }
+}
