@@ -286,11 +286,13 @@ fn the_kind_hardly_depends_on_operator_and_mass() {
         study.add(&world.found(), AddOptions::default(), &()).unwrap();
         numbers(&Loaded::of(study).unwrap()).remove("run").unwrap()[..OCTAVES].to_vec()
     };
-    let usual = of(crumple::Kind::Cotan, crumple::Mass::Lumped);
+    let mut usual = Vec::new();
     for operator in [crumple::Kind::Cotan, crumple::Kind::Tufted, crumple::Kind::Polygon] {
         for mass in [crumple::Mass::Lumped, crumple::Mass::Consistent, crumple::Mass::Identity] {
-            let similar = cosine(&usual, &of(operator, mass));
+            let found = of(operator, mass);
+            usual = if usual.is_empty() { found.clone() } else { usual };
             // With the identity the rim's vertices count for twice their area: a tenth of all.
+            let similar = cosine(&usual, &found);
             assert!(similar > 0.99, "{operator} {mass}: {similar}");
         }
     }
