@@ -20,7 +20,9 @@
 //! | other methods on the same data | [`rivals`] | displacements | PCA |
 //! | the coefficients that matter | [`descriptor`] | one state | [`descriptor::Descriptor`] |
 //! | the numbers that are compared | [`features`] | a descriptor, coefficients | a few numbers |
+//! | the same as a table | [`feature_table`] | a study or a run | a row a run |
 //! | how alike | [`similarity`] | a descriptor, coefficients | a ranking |
+//! | a run that is being computed | [`monitor`] | states as they come | on the target's path or not |
 //! | judged against labels | [`compare`] | labels | precision, average precision |
 //! | tables and arrays for others | [`export`] | a study | npy, CSV, Parquet, OBJ, STL |
 //! | one page for a person | [`report`] | a study | HTML |
@@ -33,10 +35,12 @@ pub mod compare;
 pub mod descriptor;
 mod error;
 pub mod export;
+pub mod feature_table;
 pub mod features;
 pub mod field;
 pub mod inputs;
 pub mod modes;
+pub mod monitor;
 pub mod project;
 pub mod reconstruct;
 pub mod reference;
