@@ -56,6 +56,11 @@ joining:
     rm -rf target/joining
     python3 benches/joining.py target/release/crumple target/joining
 
+# the tables of docs/rotation-spectrum.md; without ../shared those of the fine bundle are left out
+rotation:
+    cargo build --release -p crumple-cli -p structures
+    python3 benches/rotation_spectrum --write docs/rotation-spectrum.md
+
 # licences, forbidden crates and sources of Cargo.lock; without network
 deny:
     cargo deny check licenses bans sources

@@ -50,17 +50,23 @@ def all_bundles(options):
 def main():
     options = arguments()
     bench = tables.Bench(options, all_bundles(options))
-    page = open(options.write).read() if options.write else None
+    made = {}
     for name, make in tables.TABLES.items():
         if options.only and name not in options.only:
             continue
-        text = make(bench)
-        print(f"### {name}\n\n{text}\n", flush=True)
-        if page and f"<!-- table: {name} -->" in page:
-            page = re.sub(f"(<!-- table: {name} -->\n).*?(<!-- end -->)", lambda match: f"{match[1]}\n{text}\n\n{match[2]}", page, flags=re.S)
-    if page:
-        with open(options.write, "w") as file:
-            file.write(page)
+        made[name] = make(bench)
+        print(f"### {name}\n\n{made[name]}\n", flush=True)
+    if options.write:
+        write(options.write, made)
+
+
+def write(path, made):
+    """Puts tables between their marks on a page."""
+    page = open(path).read()
+    for name, text in made.items():
+        page = re.sub(f"(<!-- table: {name} -->\n).*?(<!-- end -->)", lambda match: f"{match[1]}\n{text}\n\n{match[2]}", page, flags=re.S)
+    with open(path, "w") as file:
+        file.write(page)
 
 
 if __name__ == "__main__":

@@ -64,7 +64,7 @@ def groups(points, bundle, most=8):
         tried = [maker(count).fit_predict(points) for count in range(2, most + 1)]
         best = max(tried, key=lambda found: silhouette_score(points, found))
         out[name] = best.max() + 1, adjusted_rand_score(bundle.label[labelled], best[labelled]), None
-    found = HDBSCAN(min_cluster_size=max(5, round(len(points) / 10)), min_samples=5).fit_predict(points)
+    found = HDBSCAN(min_cluster_size=max(5, round(len(points) / 10)), min_samples=5, copy=True).fit_predict(points)
     kept = labelled & (found >= 0)
     left = int((found[labelled] < 0).sum()), int((found[~labelled] < 0).sum())
     out["HDBSCAN"] = found.max() + 1, adjusted_rand_score(bundle.label[kept], found[kept]), left

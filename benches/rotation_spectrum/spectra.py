@@ -26,16 +26,26 @@ def low_pass(bundle, span=2.0, length=None):
     return np.clip(1 - log2(bundle.eigenvalues / longest) / span, 0, 1)
 
 
-def kind(bundle, rho, energy, octaves=OCTAVES, first=0, reference="octaves", what="cumulative", power=1.0):
-    """Runs x octaves: mean over each octave of the cumulative share of energy, less the reference."""
+def rest_below(last, octaves):
+    """Mean over each octave of a straight line in log2 from 0 at `last` to 1 at the end of all octaves."""
+    edges = np.maximum(np.arange(octaves + 1) - last, 0)
+    return np.diff(edges**2) / (2 * (octaves - last)) if last < octaves else np.zeros(octaves)
+
+
+def kind(bundle, rho, energy, octaves=OCTAVES, first=0, reference="octaves", what="cumulative", power=1.0, rest=True):
+    """Runs x octaves: mean over each octave of the cumulative share of energy, less the reference. With `rest` the energy that
+    the eigenvectors do not catch lies evenly between the last of them and the end."""
     shares = (rho**2).sum(2) / np.where(energy > 0, energy, 1)[:, None]
     weyl = log2(bundle.eigenvalues[: rho.shape[1]] * bundle.area / (4 * np.pi))
     ramp = np.clip(np.arange(octaves) + first + 1 - weyl[:, None], 0, 1)
     if what == "bands":  # share of energy in each octave, the first with all below it
         ramp = np.diff(ramp, axis=1, prepend=0)
         return (shares @ ramp) ** power - ((1 / octaves) ** power if reference == "octaves" else 0)
+    below = shares @ ramp
+    if rest:
+        below += np.maximum(1 - shares.sum(1), 0)[:, None] * rest_below(max(weyl[-1] - first, 0.0), octaves)
     level = (np.arange(octaves) + 0.5) / octaves if reference == "octaves" else {"half": 0.5, "none": 0.0}[reference]
-    return ((shares @ ramp) ** power - level**power) / np.sqrt(octaves)
+    return (below**power - level**power) / np.sqrt(octaves)
 
 
 def direction(bundle, rho, energy, span=2.0, length=None):

@@ -255,6 +255,8 @@ def choices(bench):
     options["direction: fades over 1 octave of λ"] = {"span": 1.0}
     options["direction: fades over 4 octaves of λ"] = {"span": 4.0}
     rows = [rows_of(word, lambda bundle, chosen=chosen: spectrum(bundle, **chosen)) for word, chosen in options.items()]
+    rows.append(rows_of("the missing energy beyond all octaves", lambda bundle: spectrum(bundle, kinds={"rest": False})))
+    rows.append(rows_of("the same, K = 100", lambda bundle: spectrum(bundle, eigenpairs=100, kinds={"rest": False})))
     captured = lambda bundle: spectrum(bundle, energy=(bundle.rho**2).sum((1, 2)))
     rows.append(rows_of("energy of the K eigenvectors, not of the field", captured))
     rows.append(rows_of("the same, K = 100", lambda bundle: spectrum(bundle, bundle.rho[:, :100], (bundle.rho[:, :100] ** 2).sum((1, 2)))))

@@ -21,7 +21,7 @@ use output::Output;
     name = "crumple",
     version,
     max_term_width = 120,
-    after_help = "Start here, on the example:\n  crumple analyze examples/hat-section/runs --join 2.5 -o study\n\nExit codes: 0 done, 1 the answer is no (verify, check), 2 bad input or failure, 130 interrupted."
+    after_help = "Start here, on the example:\n  crumple analyze examples/hat-section/runs --join 2.5 -o study\n\nExit codes: 0 done, 1 the answer is no (verify, monitor, check), 2 bad input or failure, 130 interrupted."
 )]
 struct Cli {
     /// Print the result as JSON, for scripts

@@ -134,7 +134,7 @@ pub(crate) struct ModesArgs {
     /// What makes runs alike: `rotation`, the kind and direction of the deformation wherever it happens, `displacement`,
     /// where every place ends up, as in the paper (also: `paper`), `coordinates`, which have the distances of the
     /// displacement, or a field that the study keeps [default: rotation]
-    #[arg(long, visible_alias = "kind", value_name = "WHAT")]
+    #[arg(long, value_name = "WHAT")]
     by: Option<String>,
     /// How to group: kmeans, ward, average, mixture (of Gaussians), or hdbscan, which leaves runs in no dense group without a
     /// mode [default: kmeans]

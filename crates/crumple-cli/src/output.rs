@@ -19,6 +19,12 @@ impl Output {
         let _ = out.write_all(text.trim_end().as_bytes()).and_then(|()| out.write_all(b"\n"));
     }
 
+    /// One line of a result that comes little by little; it is there at once, in a pipe too.
+    pub(crate) fn line(&self, text: &str) {
+        let mut out = std::io::stdout().lock();
+        let _ = writeln!(out, "{text}").and_then(|()| out.flush());
+    }
+
     /// A word to the person; not in the way of a script.
     pub(crate) fn note(&self, text: &str) {
         if !self.quiet {

@@ -27,6 +27,8 @@ fn commands_on<'a>(study: &'a Path, place: &'a Path) -> Vec<(&'static str, Vec<P
         ("search", words(&["search", "STUDY", "target"])),
         ("verify", words(&["verify", "STUDY", "target", "run_007"])),
         ("distance", words(&["distance", "STUDY", "target", "run_007"])),
+        ("features", words(&["features", "STUDY", "target"])),
+        ("monitor", words(&["monitor", "STUDY", "target", "RUN", "--every", "0.02", "--tolerance", "0.1"])),
         ("reconstruct", words(&["reconstruct", "STUDY", "run_007", "-o", "OUT.stl"])),
         ("export", words(&["export", "STUDY", "-o", "OUT"])),
         ("compare", words(&["compare", "STUDY"])),

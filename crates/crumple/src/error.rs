@@ -328,6 +328,30 @@ pub enum Error {
         /// What was expected.
         expected: String,
     },
+    /// A run that is followed and writes nothing new.
+    #[error("{}: no new state for {seconds} s; {}{reason}", run.display(), seen_so_far(*seen, *last_time))]
+    Silent {
+        /// The run.
+        run: PathBuf,
+        /// How long nothing came.
+        seconds: f64,
+        /// States that came.
+        seen: usize,
+        /// Time of the last of them.
+        last_time: Option<f64>,
+        /// Why what is there cannot be read, after a colon, or nothing.
+        reason: String,
+    },
+    /// A run that is followed and lost states.
+    #[error("{}: it had {before} states and has {now} now: the run was started anew", run.display())]
+    Restarted {
+        /// The run.
+        run: PathBuf,
+        /// States it had.
+        before: usize,
+        /// States it has.
+        now: usize,
+    },
     /// A table of inputs or labels that cannot be read.
     #[error("{}: {what}", path.display())]
     Table {
@@ -365,6 +389,13 @@ fn list_failures(failures: &[(String, String)]) -> String {
 /// The reason, with the run's id before it unless it begins with it.
 fn with_name(id: &str, why: &str) -> String {
     if why.starts_with(id) { why.to_owned() } else { format!("{id}: {why}") }
+}
+
+fn seen_so_far(states: usize, last: Option<f64>) -> String {
+    match (states, last) {
+        (0, _) | (_, None) => "none came at all".to_owned(),
+        (states, Some(time)) => format!("{states} came, the last at time {}", time as f32),
+    }
 }
 
 fn near_runs(near: &[String]) -> String {
@@ -439,6 +470,11 @@ impl Error {
             Self::Threshold { .. } => "rules: std:C  mean:C  value:T  top:M  energy:SHARE  error:MM",
             Self::Table { .. } => "a table is CSV with one header line and one row a run, the run in the first column",
             Self::NoMatch { .. } => "the first column must hold the runs' ids, or their numbers",
+            Self::Silent { seen: 0, .. } => {
+                "check the path: the root file (d3plot) or its folder; --timeout waits longer for the solver to start"
+            }
+            Self::Silent { .. } => "the solver may have ended or failed: see its messages; --timeout waits longer",
+            Self::Restarted { .. } => "start monitor again with the new run",
             Self::Stopped => "repeat the command to go on; runs that were added stay",
             Self::Value { .. } | Self::Internal(_) => return None,
         };

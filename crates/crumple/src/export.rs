@@ -116,24 +116,23 @@ fn table(folder: &Path, name: &str, format: Format, columns: &[(String, Column)]
         }
         Format::Csv => {
             let path = folder.join(format!("{name}.csv"));
-            write_csv(&path, columns)?;
+            store::write_whole(&path, |file| write_csv(file, &path, columns))?;
             Ok(path)
         }
     }
 }
 
-fn write_csv(path: &Path, columns: &[(String, Column)]) -> Result<(), Error> {
+/// Writes a table as CSV. `path` is named in errors.
+pub(crate) fn write_csv(file: &mut dyn Write, path: &Path, columns: &[(String, Column)]) -> Result<(), Error> {
     let failed =
         |error: csv::Error| Error::Io { action: "write", path: path.to_owned(), source: std::io::Error::other(error) };
     let rows = columns.first().map_or(0, |(_, column)| column.rows());
-    store::write_whole(path, |file| {
-        let mut writer = csv::Writer::from_writer(&mut *file);
-        writer.write_record(columns.iter().map(|(name, _)| name)).map_err(failed)?;
-        for row in 0..rows {
-            writer.write_record(columns.iter().map(|(_, column)| column.cell(row))).map_err(failed)?;
-        }
-        writer.flush().map_err(io("write", path))
-    })
+    let mut writer = csv::Writer::from_writer(file);
+    writer.write_record(columns.iter().map(|(name, _)| name)).map_err(failed)?;
+    for row in 0..rows {
+        writer.write_record(columns.iter().map(|(_, column)| column.cell(row))).map_err(failed)?;
+    }
+    writer.flush().map_err(io("write", path))
 }
 
 /// Writes a surface as OBJ: for any viewer. `positions` N × 3.

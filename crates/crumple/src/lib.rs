@@ -24,11 +24,13 @@
 //! | other methods on the same data | [`rivals`] | displacements | PCA |
 //! | the coefficients that matter | [`descriptor`] | one state | [`descriptor::Descriptor`] |
 //! | the numbers that are compared | [`features`] | a descriptor, coefficients | a few numbers |
+//! | the same as a table | [`feature_table`] | a study or a run | a row a run |
 //! | a descriptor of another study | [`transfer`] | two studies | a descriptor, its direction carried over |
 //! | how alike | [`similarity`] | a descriptor, coefficients | a ranking |
 //! | from which similarity on | [`calibrate`] | a descriptor, known runs | a threshold, its error rates |
 //! | which mode, or none | [`classify`] | modes, a state | [`classify::Verdict`] |
 //! | why they are alike | [`explain`] | two states | terms, regions, words |
+//! | a run that is being computed | [`monitor`] | states as they come | on the target's path or not |
 //! | judged against labels | [`compare`] | labels | precision, average precision |
 //! | tables and arrays for others | [`export`] | a study | npy, CSV, Parquet, OBJ, STL |
 //! | one page for a person | [`report`] | a study | HTML |
@@ -46,11 +48,13 @@ pub mod eigen;
 mod error;
 pub mod explain;
 pub mod export;
+pub mod feature_table;
 pub mod features;
 pub mod field;
 pub mod inputs;
 pub mod joints;
 pub mod modes;
+pub mod monitor;
 pub mod project;
 pub mod reconstruct;
 pub mod reference;

@@ -61,6 +61,11 @@ impl Target {
         }
     }
 
+    /// A state of a run that is not in the study and was projected by itself.
+    pub fn projected(run: &str, state: usize, found: ProjectedState) -> Self {
+        Self::of_state(run.to_owned(), state, found, Vec::new())
+    }
+
     /// What makes this state hard to compare with a descriptor's: warnings about its run, and another time.
     pub fn caveats(&self, descriptor_time: f64) -> Vec<String> {
         let mut caveats = self.warnings.clone();

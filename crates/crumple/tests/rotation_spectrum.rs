@@ -281,7 +281,8 @@ fn the_kind_hardly_depends_on_operator_and_mass() {
     world.write("run", &plate(2).family(2, fold(2.0, 30.0, 1.0)));
     let of = |operator: crumple::Kind, mass: crumple::Mass| {
         let options = BasisOptions { eigenpairs: 120, kind: operator, mass, ..Default::default() };
-        let path = world.path(&format!("{operator}-{mass}"));
+        let made = std::fs::read_dir(world.path("")).unwrap().count();
+        let path = world.path(&format!("study-{made}"));
         let mut study = Study::create(&path, &world.open("run"), &[], &[], &options, &()).unwrap();
         study.add(&world.found(), AddOptions::default(), &()).unwrap();
         numbers(&Loaded::of(study).unwrap()).remove("run").unwrap()[..OCTAVES].to_vec()

@@ -13,7 +13,7 @@ use crumple::study::Loaded;
 use crumple::target::Named;
 use serde_json::{Value, json};
 
-use super::Answer;
+use super::{Answer, interactive};
 use crate::options::DescribeArgs;
 use crate::output::{Output, percent, table, time};
 
@@ -37,6 +37,10 @@ pub(crate) struct Describe {
     /// Name to save it under [default: the run or the mode]
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
+    /// Look for t by hand: t, M, the errors and a picture of the reconstruction; + and - raise and lower t, s saves, q
+    /// quits
+    #[arg(long)]
+    interactive: bool,
     #[command(flatten)]
     describe: DescribeArgs,
 }
@@ -51,6 +55,9 @@ impl Describe {
             (run, None) => Named::in_study(&loaded.study, run.as_deref().unwrap_or_default()),
         };
         let name = self.name.as_deref().or(self.mode.as_deref());
+        if self.interactive {
+            return interactive::search(&loaded, &named, self.mode.as_deref(), name, &options, output);
+        }
         let described = descriptor::describe(&loaded, &named, self.mode.as_deref(), name, &options)?;
         let path = descriptor::save(&loaded.study, &described.descriptor)?;
         let mut facts = facts(&described.descriptor);
@@ -103,7 +110,7 @@ fn function_word(selected: &Selected) -> String {
     selected.field.map_or_else(|| "shape".into(), |field| field.to_string())
 }
 
-fn words(descriptor: &Descriptor, unit: &str) -> String {
+pub(super) fn words(descriptor: &Descriptor, unit: &str) -> String {
     let what = match (&descriptor.mode, descriptor.set) {
         (Some(mode), Set::Mean) => format!("the mean of {mode}"),
         (Some(mode), Set::Share(share)) => {

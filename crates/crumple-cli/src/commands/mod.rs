@@ -10,9 +10,12 @@ mod distance;
 mod eigen;
 mod explain;
 mod export;
+mod features;
 mod info;
 mod init;
+mod interactive;
 mod modes;
+mod monitor;
 mod reconstruct;
 mod report;
 mod search;
@@ -58,6 +61,10 @@ pub(crate) enum Command {
     Explain(explain::Explain),
     /// One number for an optimiser: how far a run is from a descriptor
     Distance(distance::Distance),
+    /// The numbers that are compared, one row a run, for optimisers and meta-models
+    Features(features::Features),
+    /// Follow a run that is being computed; exit code 1, or a stop request to the solver, once it leaves the path
+    Monitor(monitor::Monitor),
     /// The shape from a descriptor, from the first M eigenvectors or from principal components, as a file
     Reconstruct(reconstruct::Reconstruct),
     /// Arrays and tables for other tools
@@ -85,6 +92,8 @@ impl Command {
             Self::Classify(command) => command.run(output),
             Self::Explain(command) => command.run(output),
             Self::Distance(command) => command.run(output),
+            Self::Features(command) => command.run(output),
+            Self::Monitor(command) => command.run(output, watch),
             Self::Reconstruct(command) => command.run(output),
             Self::Export(command) => command.run(output),
             Self::Compare(command) => command.run(output),

@@ -23,6 +23,9 @@ pub(crate) struct Modes {
     study: PathBuf,
     #[command(flatten)]
     modes: ModesArgs,
+    /// Another word for --by, as the other commands have it: rotation or paper
+    #[arg(long, value_name = "KIND", conflicts_with = "by")]
+    kind: Option<String>,
     /// Give a mode a name, which it keeps; may be given several times. Alone it names the modes that are there, without
     /// grouping anew. Nothing after the = takes the name away
     #[arg(long = "name", value_name = "MODE=NAME")]
@@ -31,11 +34,14 @@ pub(crate) struct Modes {
 
 impl Modes {
     pub(crate) fn run(&self, output: &Output, watch: &dyn Watch) -> Result<Answer, Error> {
-        let options = self.modes.options()?;
+        let mut options = self.modes.options()?;
+        if let Some(kind) = &self.kind {
+            options.by = kind.parse()?;
+        }
         let names: Vec<(&str, &str)> = self.names.iter().map(|text| pair(text)).collect::<Result<_, _>>()?;
         let study = Study::open(&self.study)?;
         let mut found = match modes::load(&study) {
-            Ok(found) if !names.is_empty() && !self.modes.asked() => found,
+            Ok(found) if !names.is_empty() && self.kind.is_none() && !self.modes.asked() => found,
             _ => modes::modes(&study, &options, watch)?,
         };
         let before: Vec<String> = found.modes.iter().map(|mode| mode.name.clone()).collect();

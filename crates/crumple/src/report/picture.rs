@@ -97,6 +97,12 @@ impl Frame {
 /// nothing to draw the picture is blank.
 pub fn picture(vertices: &[[f64; 3]], triangles: &[[u32; 3]], values: &[f64], range: f64, view: &View) -> Vec<u8> {
     let (width, height) = (view.width.clamp(1, SIDE_MAX), view.height.clamp(1, SIDE_MAX));
+    encode(&pixels(vertices, triangles, values, range, view), width, height)
+}
+
+/// The pixels of [`picture`], row by row from the top: height × width × 4, RGBA with straight alpha.
+pub fn pixels(vertices: &[[f64; 3]], triangles: &[[u32; 3]], values: &[f64], range: f64, view: &View) -> Vec<u8> {
+    let (width, height) = (view.width.clamp(1, SIDE_MAX), view.height.clamp(1, SIDE_MAX));
     let triangles: Vec<[usize; 3]> = triangles
         .iter()
         .map(|corners| corners.map(|corner| corner as usize))
@@ -111,7 +117,7 @@ pub fn picture(vertices: &[[f64; 3]], triangles: &[[u32; 3]], values: &[f64], ra
             canvas.triangle(corners.map(|corner| place(vertices[corner])), corners.map(share), *normals);
         }
     }
-    encode(&canvas.pixels(), width, height)
+    canvas.pixels()
 }
 
 // ---- where things are ---------------------------------------------------------------------------------------------

@@ -8,7 +8,8 @@
 //!
 //! **Kind.** For each octave of ν from 1 to 512 the mean, over the octave in log ν, of the share below ν,
 //! F(ν) = Σ_{ν_j ≤ ν} s_j, against that of a field with as much energy in every octave: where along the frequencies the
-//! turning happens. **Direction.** ρ_j / √E, with sign, for waves as long as the part and fading out to half of that:
+//! turning happens. What the K eigenvectors do not catch is taken to lie evenly between the last of them and 512, so that
+//! their number hardly matters. **Direction.** ρ_j / √E, with sign, for waves as long as the part and fading out to half of that:
 //! which way it turned as a whole. docs/rotation-spectrum.md derives and ablates every choice.
 
 use serde::{Deserialize, Serialize};
@@ -66,6 +67,8 @@ pub struct Ruler {
     above: Vec<[f64; OCTAVES]>,
     /// For each eigenvector the octave that its frequency lies in; K.
     octave: Vec<Option<usize>>,
+    /// How much of what the eigenvectors do not catch lies below, as mean over each octave.
+    rest: [f64; OCTAVES],
     /// Weights w_j of the direction, falling; those above zero, at least one.
     weights: Vec<f64>,
 }
@@ -98,8 +101,9 @@ impl Ruler {
         };
         let weights = basis.eigenvalues.iter().enumerate().map(weight).take_while(|weight| *weight > 0.0).collect();
         let octave = |log: &f64| (*log < OCTAVES as f64).then(|| log.max(0.0) as usize);
+        let rest = rest_below(logs.last().copied().unwrap_or(0.0).max(0.0));
         let (above, octave) = (logs.iter().map(above).collect(), logs.iter().map(octave).collect());
-        Self { area, total_mass, above, octave, weights }
+        Self { area, total_mass, above, octave, rest, weights }
     }
 
     /// Triples that the direction has.
@@ -115,14 +119,17 @@ impl Ruler {
             return RotationSpectrum { turn, octaves, kind: vec![0.0; OCTAVES], direction };
         }
         let energy = turn * turn * self.total_mass;
-        let mut below = [0.0; OCTAVES];
+        let (mut below, mut caught) = ([0.0; OCTAVES], 0.0);
         for ((rho, above), octave) in rho.iter().zip(&self.above).zip(&self.octave) {
             let share = square(*rho) / energy;
+            caught += share;
             below.iter_mut().zip(above).for_each(|(below, above)| *below += share * above);
             if let Some(octave) = octave {
                 octaves[*octave] += share;
             }
         }
+        let missing = (1.0 - caught).max(0.0);
+        below.iter_mut().zip(&self.rest).for_each(|(below, rest)| *below += missing * rest);
         let count = OCTAVES as f64;
         let kind = (0..).zip(below).map(|(at, below)| (below - (f64::from(at) + 0.5) / count) / count.sqrt()).collect();
         RotationSpectrum { turn, octaves, kind, direction: self.direction(rho, energy.sqrt()) }
@@ -150,5 +157,29 @@ impl Ruler {
     pub fn wavelengths(&self) -> [(f64, f64); OCTAVES] {
         let wavelength = |octave: usize| (std::f64::consts::PI * self.area / f64::from(1 << octave)).sqrt();
         std::array::from_fn(|octave| (wavelength(octave), wavelength(octave + 1)))
+    }
+}
+
+/// Mean over each octave of a straight line in log₂ ν from 0 at `last`, that of the last eigenvector, to 1 at the end of
+/// all octaves: no jump where `last` comes to that end.
+fn rest_below(last: f64) -> [f64; OCTAVES] {
+    let left = OCTAVES as f64 - last;
+    let integral = |to: f64| if to > last { (to - last).powi(2) / (2.0 * left) } else { 0.0 };
+    std::array::from_fn(|octave| integral(octave as f64 + 1.0) - integral(octave as f64))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rest_rises_from_the_last_eigenvector_to_the_end() {
+        assert_eq!(rest_below(OCTAVES as f64), [0.0; OCTAVES]);
+        assert_eq!(rest_below(20.0), [0.0; OCTAVES]);
+        let whole = rest_below(0.0);
+        assert!((0..OCTAVES).all(|o| (whole[o] - (o as f64 + 0.5) / OCTAVES as f64).abs() < 1e-15), "{whole:?}");
+        let late = rest_below(7.5);
+        // Over 7 … 8 half a unit of a line to 1/3; over 8 … 9 from 1/3 to 1.
+        assert!(late[..7] == [0.0; 7] && (late[7] - 1.0 / 12.0).abs() < 1e-15 && (late[8] - 2.0 / 3.0).abs() < 1e-15);
     }
 }

@@ -43,7 +43,7 @@ pub use coefficients::{Coefficients, Function, Need, Stored, column_name};
 pub use loaded::Loaded;
 pub use manifest::{FileRecord, LAYOUT, Manifest, RunRecord};
 pub use mesh_file::write_shape;
-pub(crate) use tables::{Column, metadata_of, run_columns, write_columns};
+pub(crate) use tables::{Column, add_inputs, metadata_of, run_columns, write_columns};
 
 use staged::StagedFolder;
 

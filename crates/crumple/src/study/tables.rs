@@ -134,15 +134,18 @@ pub(crate) fn run_columns(manifest: &Manifest) -> Vec<(String, Column)> {
         ("strain_p95".to_owned(), number(&|run| run.last.strain_p95)),
         ("warnings".to_owned(), text(&|run| run.warnings.join("; "))),
     ];
-    add_inputs(&mut columns, manifest);
+    let values = |input: &String| manifest.runs.values().map(|run| run.inputs.get(input).map(String::as_str)).collect();
+    add_inputs(&mut columns, manifest.inputs.iter().map(|input| (input.as_str(), values(input))));
     columns
 }
 
-/// Appends the inputs of the runs; one that is called like a column that is there gets `input_` before its name.
-fn add_inputs(columns: &mut Vec<(String, Column)>, manifest: &Manifest) {
-    for input in &manifest.inputs {
-        let values = manifest.runs.values().map(|run| run.inputs.get(input).map(String::as_str)).collect();
-        let mut name = input.clone();
+/// Appends inputs, name and texts; one that is called like a column that is there gets `input_` before its name.
+pub(crate) fn add_inputs<'a>(
+    columns: &mut Vec<(String, Column)>,
+    inputs: impl Iterator<Item = (&'a str, Vec<Option<&'a str>>)>,
+) {
+    for (input, values) in inputs {
+        let mut name = input.to_owned();
         while columns.iter().any(|(column, _)| *column == name) {
             name = format!("input_{name}");
         }
