@@ -85,10 +85,8 @@ fn single_precision_halves_the_vectors_and_nothing_else() {
     crumple!["eigen", hat_section(), "--eigenpairs", "10", "-o", &half, "--f32"].done();
     let (a, b) = (header(&whole), header(&half));
     assert_eq!((&b.0["eigenvectors"]["dtype"], &b.0["eigenvalues"]["dtype"]), (&"F32".into(), &"F64".into()));
-    let size = |h: &Value| {
-        let offset = |end: usize| h["eigenvectors"]["data_offsets"][end].as_u64().unwrap();
-        offset(1) - offset(0)
-    };
+    let end = |h: &Value, at: usize| h["eigenvectors"]["data_offsets"][at].as_u64().unwrap();
+    let size = |h: &Value| end(h, 1) - end(h, 0);
     assert_eq!(size(&a.0), 2 * size(&b.0));
     assert_eq!(doubles(&a.0, &a.1, "mass"), doubles(&b.0, &b.1, "mass"));
 }
