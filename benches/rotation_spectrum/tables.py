@@ -1,7 +1,9 @@
 """The tables, one function each: a Bench in, Markdown out."""
 
+import json
 import os
 import shutil
+import subprocess
 from functools import cached_property
 
 import numpy as np
@@ -280,7 +282,30 @@ def functions(bench):
     return table(["function", *names], [[word, *(cells[name] for name in names)] for word, cells in found.items()])
 
 
+def program(bench):
+    """The similarities that `crumple search` prints against those of this bench, for the first run of each label."""
+    pairs = [(name, name) for name in bench.bundles] + [("hat", "hat, joined"), ("hat", "hat, fine"), ("hat, fine", "hat")]
+    rows = []
+    for source, target in pairs:
+        if target not in bench.bundles or source not in bench.bundles:
+            continue
+        one, other = bench.bundles[source], bench.bundles[target]
+        points = bench.spectra[source] if source == target else carried(one, other)
+        options = [] if source == target else ["--from", one.study]
+        queries = [int(np.flatnonzero(one.label == label)[0]) for label in sorted(set(one.label))]
+        moved = []
+        for query in queries:
+            arguments = [bench.options.program, "--quiet", "--json", "search", other.study, one.runs[query], "--top", str(len(other.runs)), *options]
+            found = json.loads(subprocess.run(arguments, check=True, capture_output=True).stdout)["results"]
+            printed = {hit["run"]: hit["similarity"] for hit in found}
+            ours = bench.spectra[target] @ points[query]
+            moved.append(max(abs(printed[run] - ours[at]) for at, run in enumerate(other.runs)))
+        rows.append([source, target, len(queries), f"{max(moved):.2g}"])
+    return table(["query from", "searched", "queries", "largest difference"], rows)
+
+
 TABLES = {
+    "program": program,
     "ranking": ranking,
     "certainty": certainty,
     "modes": modes,
