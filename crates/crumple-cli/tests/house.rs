@@ -181,6 +181,7 @@ fn every_command_is_there() {
         "distance",
         "reconstruct",
         "export",
+        "convert",
         "compare",
         "report",
         "check",

@@ -3,9 +3,16 @@
 //! With [`crate::bundle`], which finds result files, this is the only module that knows which readers there are. The rest of the method sees node ids, shell faces,
 //! times and positions.
 
+mod convert;
+mod ranges;
+mod units;
+
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
+
+pub use convert::{ConvertOptions, Converted};
+pub use units::Units;
 
 use crate::Error;
 
@@ -34,6 +41,10 @@ pub struct Info {
     pub byte_order: &'static str,
     /// Release of the solver, as far as the file tells.
     pub release: String,
+    /// The solver: LS-DYNA and its release, or that the file does not tell.
+    pub solver: String,
+    /// Units, guessed, with the reason.
+    pub units: Units,
     /// Number of nodes.
     pub nodes: usize,
     /// Elements by kind.
@@ -74,6 +85,8 @@ pub struct PartInfo {
     pub id: u64,
     /// Its title.
     pub title: String,
+    /// Number of its material model (20 is rigid); `None` where the file does not tell, as most do not.
+    pub material: Option<u64>,
     /// Its elements.
     #[serde(flatten)]
     pub elements: Elements,
@@ -123,7 +136,16 @@ impl Run {
     /// # Errors
     /// [`Error::Read`] if it is no readable result file.
     pub fn open(id: impl Into<String>, path: &Path) -> Result<Self, Error> {
-        let family = d3plot::Family::open(path)?;
+        Self::open_mapped(id, path, false)
+    }
+
+    /// As [`Run::open`]; with `map` the files are mapped into memory. Safe only where no process cuts or changes them
+    /// while the run is open: a mapped file that becomes shorter ends the program by a signal.
+    ///
+    /// # Errors
+    /// As [`Run::open`].
+    pub fn open_mapped(id: impl Into<String>, path: &Path, map: bool) -> Result<Self, Error> {
+        let family = d3plot::Family::open_with(path, d3plot::ReadOptions { map })?;
         let node_ids = (0..family.header().nodes).map(|node| family.geometry().node_id(node)).collect();
         Ok(Self { id: id.into(), path: family.root().to_owned(), node_ids, source: Source::D3plot(Box::new(family)) })
     }
@@ -184,6 +206,7 @@ impl Run {
         let part = |part: &d3plot::Part| PartInfo {
             id: part.id,
             title: part.title.clone(),
+            material: part.material,
             elements: Elements {
                 solids: part.solids,
                 thick_shells: part.thick_shells,
@@ -204,6 +227,8 @@ impl Run {
                 d3plot::ByteOrder::Big => "big",
             },
             release: header.release.clone(),
+            solver: solver(&header.release),
+            units: self.units(),
             nodes: header.nodes,
             elements: Elements {
                 solids: header.solids,
@@ -252,5 +277,14 @@ impl Run {
     pub fn positions(&self, state: usize) -> Result<Vec<[f64; 3]>, Error> {
         let Source::D3plot(family) = &self.source;
         family.coordinates(state)?.ok_or_else(|| Error::NoCoordinates { run: self.id.clone() })
+    }
+}
+
+/// The solver by the word of its release: `R713`, ` R14`. Other writers put anything there.
+fn solver(release: &str) -> String {
+    let release = release.trim();
+    match release.strip_prefix('R').filter(|number| number.starts_with(|c: char| c.is_ascii_digit())) {
+        Some(_) => format!("LS-DYNA {release}"),
+        None => "not told".to_owned(),
     }
 }

@@ -4,6 +4,7 @@ mod add;
 mod analyze;
 mod check;
 mod compare;
+mod convert;
 mod describe;
 mod distance;
 mod export;
@@ -53,6 +54,8 @@ pub(crate) enum Command {
     Reconstruct(reconstruct::Reconstruct),
     /// Arrays and tables for other tools
     Export(export::Export),
+    /// A run as another d3plot family: other precision, byte order, size of the files
+    Convert(convert::Convert),
     /// The descriptor against its rivals: size, errors, and, given labels, quality of the ranking
     Compare(compare::Compare),
     /// One self-contained page for a person
@@ -75,6 +78,7 @@ impl Command {
             Self::Distance(command) => command.run(output),
             Self::Reconstruct(command) => command.run(output),
             Self::Export(command) => command.run(output),
+            Self::Convert(command) => command.run(output, watch),
             Self::Compare(command) => command.run(output),
             Self::Report(command) => command.run(output, watch),
             Self::Check(command) => command.run(output),
