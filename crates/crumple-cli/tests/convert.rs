@@ -81,7 +81,9 @@ fn what_is_written_other_programs_read_with_the_same_numbers() {
         // the numbers are those of the family it was made of
         let ours = info(&testdata(family));
         assert_eq!(told["states"], ours["states"], "{family}");
-        for program in ["lasso", "vtk"] {
+        // VTK 9.7.2 dies on these two by a signal, as LS-DYNA wrote them and as they are written here
+        let programs = if family.starts_with("lasso_") { &["lasso"][..] } else { &["lasso", "vtk"] };
+        for &program in programs {
             let theirs = read_with(&python, program, &root);
             agree(&format!("{family}, times, {program}"), &ours["times"], &theirs["times"]);
             for (state, theirs) in ["first_state", "last_state"].iter().zip(rows(&theirs["states"])) {
