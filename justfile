@@ -74,6 +74,24 @@ bench-analyze bundle="examples/hat-section/runs" repeats="3":
     cargo build --release
     python3 benches/side_by_side.py {{ bundle }} --repeats {{ repeats }} --scratch target/side-by-side
 
+# our reader beside plain reads and lasso-python on a family of 400 MB, and opening 1,000 files
+bench-read repeats="3":
+    cargo build --release -p d3plot --example measure
+    python3 benches/read_peers.py target/release/examples/measure --scratch target/bench-read --repeats {{ repeats }}
+
+# the table of docs/reading.md: every test family read by us, lasso-python, VTK and dynars (the last: pip install dynars)
+read-table:
+    cargo build --release
+    python3 benches/read_table.py target/release/crumple crates/d3plot/testdata ../shared/data/d3plot
+
+# fuzz the reader, `seconds` for each target; needs a nightly toolchain and cargo-fuzz
+fuzz seconds="300":
+    for target in family header geometry state; do \
+        mkdir -p target/fuzz-corpus/$target && \
+        cargo +nightly fuzz run --fuzz-dir fuzz -s none $target target/fuzz-corpus/$target fuzz/corpus/$target -- \
+            -max_total_time={{ seconds }} -max_len=60000 -timeout=10 -rss_limit_mb=2048 || exit 1; \
+    done
+
 # fetch and bundle the report's JavaScript anew
 vendor:
     crates/crumple/src/report/page/vendor/make.sh

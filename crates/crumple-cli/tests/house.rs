@@ -205,6 +205,7 @@ fn every_command_is_there() {
         "monitor",
         "reconstruct",
         "export",
+        "convert",
         "compare",
         "report",
         "check",

@@ -3,11 +3,18 @@
 //! With [`crate::bundle`], which finds result files, this is the only module that knows which readers there are. The rest of the method sees node ids, shell faces,
 //! times and positions.
 
+mod convert;
+mod ranges;
+mod units;
+
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use keyword_deck::Deck;
 use serde::Serialize;
+
+pub use convert::{ConvertOptions, Converted};
+pub use units::Units;
 
 use crate::Error;
 use crate::deck::{self, Surface};
@@ -54,6 +61,10 @@ pub struct Info {
     pub byte_order: &'static str,
     /// Release of the solver, as far as the file tells.
     pub release: String,
+    /// The solver: LS-DYNA and its release, or that the file does not tell.
+    pub solver: String,
+    /// Units, guessed, with the reason.
+    pub units: Units,
     /// Number of nodes.
     pub nodes: usize,
     /// Elements by kind.
@@ -94,6 +105,8 @@ pub struct PartInfo {
     pub id: u64,
     /// Its title.
     pub title: String,
+    /// Number of its material model (20 is rigid); `None` where the file does not tell, as most do not.
+    pub material: Option<u64>,
     /// Its elements.
     #[serde(flatten)]
     pub elements: Elements,
@@ -144,13 +157,22 @@ impl Run {
     /// # Errors
     /// [`Error::Read`] if it is no readable result file, [`Error::Deck`] if it is no readable deck.
     pub fn open(id: impl Into<String>, path: &Path) -> Result<Self, Error> {
+        Self::open_mapped(id, path, false)
+    }
+
+    /// As [`Run::open`]; with `map` the files are mapped into memory. Safe only where no process cuts or changes them
+    /// while the run is open: a mapped file that becomes shorter ends the program by a signal.
+    ///
+    /// # Errors
+    /// As [`Run::open`].
+    pub fn open_mapped(id: impl Into<String>, path: &Path, map: bool) -> Result<Self, Error> {
         if deck::is_deck(path) {
             let deck = Arc::new(deck::read(path)?);
             let source = Source::Deck { deck: Arc::clone(&deck), surface: Surface::of(&deck) };
             let node_ids = deck.node_ids.clone();
             return Ok(Self { id: id.into(), path: path.to_owned(), node_ids, source, deck: Some(deck) });
         }
-        let family = d3plot::Family::open(path)?;
+        let family = d3plot::Family::open_with(path, d3plot::ReadOptions { map })?;
         let node_ids = (0..family.header().nodes).map(|node| family.geometry().node_id(node)).collect();
         let path = family.root().to_owned();
         Ok(Self { id: id.into(), path, node_ids, source: Source::D3plot(Box::new(family)), deck: None })
@@ -258,6 +280,7 @@ impl Run {
         let part = |part: &d3plot::Part| PartInfo {
             id: part.id,
             title: part.title.clone(),
+            material: part.material,
             elements: Elements {
                 solids: part.solids,
                 thick_shells: part.thick_shells,
@@ -278,6 +301,8 @@ impl Run {
                 d3plot::ByteOrder::Big => "big",
             },
             release: header.release.clone(),
+            solver: solver(&header.release),
+            units: self.units(),
             nodes: header.nodes,
             elements: Elements {
                 solids: header.solids,
@@ -411,5 +436,14 @@ mod tests {
         assert_eq!(von_mises(&points, Layer::Inner), 3_f64.sqrt() * 100.0);
         assert_eq!((von_mises(&points, Layer::Outer), von_mises(&points, Layer::Min)), (0.0, 0.0));
         assert!(von_mises(&points[..6], Layer::Outer).is_nan(), "one layer has no outer one");
+    }
+}
+
+/// The solver by the word of its release: `R713`, ` R14`. Other writers put anything there.
+fn solver(release: &str) -> String {
+    let release = release.trim();
+    match release.strip_prefix('R').filter(|number| number.starts_with(|c: char| c.is_ascii_digit())) {
+        Some(_) => format!("LS-DYNA {release}"),
+        None => "not told".to_owned(),
     }
 }

@@ -43,6 +43,7 @@ mod titles;
 
 // the states
 mod quantity;
+mod ranges;
 mod results;
 mod series;
 mod state;
@@ -61,6 +62,7 @@ pub use elements::{Beam, Geometry, Particle, Shell, Solid};
 pub use error::{Error, LooksLike};
 pub use family::{Family, Member, ReadOptions};
 pub use parts::Part;
+pub use ranges::{Component, Range};
 pub use results::{Deletion, Table};
 pub use roots::{Refused, Root, Roots, roots};
 pub use series::{Series, StateValues};
@@ -68,4 +70,6 @@ pub use state::Field;
 pub use values::{Layers, Real, Rows};
 pub use warning::Warning;
 pub use words::{ByteOrder, Precision};
-pub use write::{Content, DeletionTable, Positions, StateWriter, Stored, Thermal, WordsEach, WriteOptions, Writer};
+pub use write::{
+    Content, Copied, DeletionTable, Positions, StateWriter, Stored, Thermal, WordsEach, WriteOptions, Writer,
+};

@@ -307,12 +307,20 @@ fn read_at(mut file: &File, into: &mut [u8], offset: u64) -> std::io::Result<usi
     file.read(into)
 }
 
-/// The first bytes of a file, at most `count`.
+/// The first bytes of a file, at most `count`. One read where the file has them: a folder may hold thousands.
 pub(crate) fn read_head(path: &Path, count: u64) -> Result<Vec<u8>, Error> {
-    use std::io::Read;
     let file = File::open(path).map_err(Error::io(path, "opening"))?;
-    let mut head = Vec::new();
-    file.take(count).read_to_end(&mut head).map_err(Error::io(path, "reading"))?;
+    let mut head = vec![0; count as usize];
+    let mut filled = 0;
+    while filled < head.len() {
+        match read_at(&file, &mut head[filled..], filled as u64) {
+            Ok(0) => break,
+            Ok(count) => filled += count,
+            Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(Error::io(path, "reading")(error)),
+        }
+    }
+    head.truncate(filled);
     Ok(head)
 }
 

@@ -261,6 +261,13 @@ impl Family {
         Ok(())
     }
 
+    /// Values of all rows that the state stores, none for those it leaves out.
+    pub(crate) fn stored_values(&self, state: usize, access: &Access, into: &mut Vec<f64>) -> Result<(), Error> {
+        let start = self.start(state)?;
+        into.reserve_exact((access.field.rows as usize).saturating_mul(access.columns()));
+        self.decode(start, access, 0..access.field.rows, into)
+    }
+
     /// Rows that are not all of the block in order: those close together are read in one go.
     fn scattered<T: Real>(
         &self,

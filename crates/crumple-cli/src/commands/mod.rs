@@ -5,6 +5,7 @@ mod analyze;
 mod check;
 mod classify;
 mod compare;
+mod convert;
 mod describe;
 mod distance;
 mod eigen;
@@ -69,6 +70,8 @@ pub(crate) enum Command {
     Reconstruct(reconstruct::Reconstruct),
     /// Arrays and tables for other tools
     Export(export::Export),
+    /// A run as another d3plot family: other precision, byte order, size of the files
+    Convert(convert::Convert),
     /// The descriptor against its rivals: size, errors, and, given labels, quality of the ranking
     Compare(compare::Compare),
     /// One self-contained page for a person
@@ -96,6 +99,7 @@ impl Command {
             Self::Monitor(command) => command.run(output, watch),
             Self::Reconstruct(command) => command.run(output),
             Self::Export(command) => command.run(output),
+            Self::Convert(command) => command.run(output, watch),
             Self::Compare(command) => command.run(output),
             Self::Report(command) => command.run(output, watch),
             Self::Check(command) => command.run(output),

@@ -8,9 +8,10 @@ use crate::detect::CONTROL_WORDS;
 /// Words behind the 64 where one of them is needed; what the solver writes.
 pub(super) const EXTRA: u64 = 64;
 
-/// Whether a word behind the first 64 says something.
+/// Whether a word behind the first 64 says something. VTK's reader dies of any word there, so none is written in vain.
 pub(super) fn needs_extra(control: &Control) -> bool {
-    control.nt3d > 0 || control.neipb > 0 || control.penetration > 0 || control.contact_energy || control.kinetic_energy
+    let of_elements = control.nt3d > 0 && control.solids > 0 || control.neipb > 0 && control.beams > 0;
+    of_elements || control.penetration > 0 || control.contact_energy || control.kinetic_energy
 }
 
 /// Adds the control block. Words that are not named here are 0.

@@ -6,6 +6,7 @@
 
 mod content;
 mod control;
+mod copy;
 mod geometry;
 mod members;
 mod state;
@@ -13,6 +14,7 @@ mod state;
 use std::path::Path;
 
 pub use content::{Content, DeletionTable, Positions, Stored, Thermal, WordsEach};
+pub use copy::Copied;
 pub use state::StateWriter;
 
 use crate::control::Control;
