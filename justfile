@@ -76,8 +76,8 @@ bench-analyze bundle="examples/hat-section/runs" repeats="3":
 
 # our reader beside plain reads and lasso-python on a family of 400 MB, and opening 1,000 files
 bench-read repeats="3":
-    cargo build --release -p d3plot --example measure
-    python3 benches/read_peers.py target/release/examples/measure --scratch target/bench-read --repeats {{ repeats }}
+    cargo build --release -p d3plot --example read_speed
+    python3 benches/read_peers.py target/release/examples/read_speed --scratch target/bench-read --repeats {{ repeats }}
 
 # the table of docs/reading.md: every test family read by us, lasso-python, VTK and dynars (the last: pip install dynars)
 read-table:

@@ -3,7 +3,7 @@
 
     python benches/read_peers.py MEASURE --scratch FOLDER [--repeats 3]
 
-MEASURE is the example program of the crate d3plot (`crates/d3plot/examples/measure.rs`), which also writes the families.
+MEASURE is the example program of the crate d3plot (`crates/d3plot/examples/read_speed.rs`), which also writes the families.
 Warm cache. lasso-python is asked for the positions alone (`state_array_filter`) and for everything, each in a process of its
 own, alternating with ours; times are medians and leave the start of Python and its imports out, memory is the largest
 resident set of the process.
