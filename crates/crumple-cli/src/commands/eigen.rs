@@ -40,7 +40,7 @@ pub(crate) struct Eigen {
     join: Option<f64>,
     /// A pair is accepted when its residual is below this share of the largest eigenvalue, above 0 and below 0.01
     /// [default: 1e-10]
-    #[arg(long, value_name = "T", allow_negative_numbers = true)]
+    #[arg(long, value_name = "T", allow_hyphen_values = true)]
     tolerance: Option<f64>,
     /// Seed of the random start; another one gives the same spectrum with other rounding [default: 1]
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
