@@ -106,9 +106,12 @@ pub struct Measures {
     pub turn: f64,
 }
 
+/// A measure: its column's name, and how it is taken.
+type Column = (&'static str, fn(&Measures) -> f64);
+
 impl Measures {
-    /// Every measure by its column's name.
-    pub(crate) const COLUMNS: [(&str, fn(&Self) -> f64); 9] = [
+    /// Every measure.
+    pub(crate) const COLUMNS: [Column; 9] = [
         ("rms", |m| m.rms),
         ("max", |m| m.max),
         ("captured", |m| m.captured),

@@ -425,6 +425,15 @@ fn von_mises(points: &[f64], layer: Layer) -> f64 {
     }
 }
 
+/// The solver by the word of its release: `R713`, ` R14`. Other writers put anything there.
+fn solver(release: &str) -> String {
+    let release = release.trim();
+    match release.strip_prefix('R').filter(|number| number.starts_with(|c: char| c.is_ascii_digit())) {
+        Some(_) => format!("LS-DYNA {release}"),
+        None => "not told".to_owned(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -436,14 +445,5 @@ mod tests {
         assert_eq!(von_mises(&points, Layer::Inner), 3_f64.sqrt() * 100.0);
         assert_eq!((von_mises(&points, Layer::Outer), von_mises(&points, Layer::Min)), (0.0, 0.0));
         assert!(von_mises(&points[..6], Layer::Outer).is_nan(), "one layer has no outer one");
-    }
-}
-
-/// The solver by the word of its release: `R713`, ` R14`. Other writers put anything there.
-fn solver(release: &str) -> String {
-    let release = release.trim();
-    match release.strip_prefix('R').filter(|number| number.starts_with(|c: char| c.is_ascii_digit())) {
-        Some(_) => format!("LS-DYNA {release}"),
-        None => "not told".to_owned(),
     }
 }

@@ -112,8 +112,11 @@ fn all<T: d3plot::Real>(family: &Family, values: &mut Vec<T>) -> Result<(), Box<
     Ok(())
 }
 
-/// File, byte and length of the coordinates of each state, for plain reading.
-fn places(family: &Family) -> Result<Vec<(File, u64, usize)>, Box<dyn Error>> {
+/// A file, where to begin in it, and how much to read.
+type Place = (File, u64, usize);
+
+/// The coordinates of each state, for plain reading.
+fn places(family: &Family) -> Result<Vec<Place>, Box<dyn Error>> {
     let words = 1 + family.fields().iter().find(|field| field.name == "globals").map_or(0, |field| field.columns);
     let (state, nodes) = (family.header().words_per_state * 4, family.header().nodes * 12);
     let mut places = Vec::new();
@@ -126,7 +129,7 @@ fn places(family: &Family) -> Result<Vec<(File, u64, usize)>, Box<dyn Error>> {
 }
 
 /// Reads the same bytes into one buffer and does nothing with them.
-fn plain(places: &[(File, u64, usize)], bytes: &mut Vec<u8>) -> Result<(), Box<dyn Error>> {
+fn plain(places: &[Place], bytes: &mut Vec<u8>) -> Result<(), Box<dyn Error>> {
     for (file, at, count) in places {
         bytes.resize(*count, 0);
         file.read_exact_at(bytes, *at)?;

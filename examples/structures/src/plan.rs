@@ -34,7 +34,7 @@ fn run(structure: &dyn Structure, label: &'static str, random: &mut ChaCha8Rng) 
     inputs.insert("onset", between(random, 0.0, 0.3));
     inputs.insert("power", between(random, 0.8, 1.3));
     for name in WAVES {
-        let range = if name.ends_with("phase") || name.ends_with("way") { (0.0, 6.28) } else { (-20.0, 20.0) };
+        let range = if name.ends_with("phase") || name.ends_with("way") { (0.0, 628.0 / 100.0) } else { (-20.0, 20.0) };
         inputs.insert(name, between(random, range.0, range.1));
     }
     let main = if label == "mixed" { structure.modes()[index(random, structure.modes().len())] } else { label };

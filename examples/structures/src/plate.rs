@@ -47,7 +47,7 @@ impl Structure for Plate {
             ("corrugate_waves", waves),
             ("corrugate_place", between(random, margin, SIZE[0] - margin)),
             ("corrugate_turn", between(random, -0.3, 0.3)),
-            ("corrugate_phase", between(random, 0.0, 6.28)),
+            ("corrugate_phase", between(random, 0.0, 628.0 / 100.0)),
         ])
     }
 

@@ -42,7 +42,7 @@ impl Structure for Rail {
             ("fold_wavelength", wavelength),
             ("fold_waves", waves),
             ("fold_place", between(random, margin, LENGTH - margin)),
-            ("fold_phase", between(random, 0.0, 6.28)),
+            ("fold_phase", between(random, 0.0, 628.0 / 100.0)),
             ("hinge_1", between(random, 120.0, 220.0)),
             ("hinge_2", between(random, 400.0, 700.0)),
             ("hinge_3", between(random, 880.0, 980.0)),

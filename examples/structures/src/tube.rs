@@ -43,7 +43,7 @@ impl Structure for Tube {
             ("fold_wavelength", wavelength),
             ("fold_waves", waves),
             ("fold_place", between(random, margin, LENGTH - margin)),
-            ("fold_phase", between(random, 0.0, 6.28)),
+            ("fold_phase", between(random, 0.0, 628.0 / 100.0)),
             ("kink_place", between(random, 0.12, 0.7)),
             ("kink_half_width", between(random, 0.06, 0.1)),
             ("twist_from", between(random, 0.0, 0.3)),

@@ -37,6 +37,8 @@ pub(crate) enum Answer {
 
 /// The commands, in the order in which they are used.
 #[derive(Subcommand)]
+// Made once, from the command line.
+#[allow(clippy::large_enum_variant)]
 pub(crate) enum Command {
     /// All of it: find the runs, make the study, find the modes, describe them, write the report
     Analyze(analyze::Analyze),
