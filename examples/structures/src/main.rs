@@ -17,7 +17,7 @@ use clap::Parser;
 
 use model::Structure;
 
-/// Write labelled bundles of analytic deformations: OUT_DIR/<structure>/{runs/run_NNN/d3plot, labels.csv, inputs.csv}.
+/// Write labelled bundles of analytic deformations: `OUT_DIR/STRUCTURE/{runs/run_NNN/d3plot, labels.csv, inputs.csv}`.
 #[derive(Parser)]
 struct Arguments {
     /// Folder to write into
