@@ -36,7 +36,10 @@ mod mesh;
 mod operator;
 mod proximity;
 
-pub use eigen::{Certificate, EigenError, EigenOptions, Eigenbasis, InertiaCount, Method, Watch, eigenbasis};
+pub use eigen::{
+    Certificate, EigenError, EigenOptions, Eigenbasis, InertiaCount, Instructions, Method, Orthogonality, Watch,
+    eigenbasis,
+};
 pub use inspect::{Inspection, inspect};
 pub use join::{Join, JoinError, join};
 pub use mesh::{Mesh, MeshError};

@@ -12,7 +12,7 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Par, Side};
 
 use crate::eigen::EigenError;
-use crate::eigen::block::{WIDTH, ZERO};
+use crate::eigen::block::{Block, WIDTH};
 use crate::eigen::solve::{Packed, Supernode};
 use crate::operator::Csr;
 
@@ -114,13 +114,13 @@ fn pack(symbolic: &supernodal::SymbolicSupernodalCholesky<usize>, l: &[f64], shi
         let (blocks, groups) = (width.div_ceil(WIDTH), pattern.len().div_ceil(WIDTH));
         let stride = width.next_multiple_of(4);
         let diagonal = values_len;
-        let below = diagonal + WIDTH * (blocks * (blocks + 1) / 2);
+        let below = diagonal + WIDTH * (blocks * (blocks - 1) / 2) + width;
         values_len = below + groups * stride;
         supernodes.push(Supernode { begin, width, stride, diagonal, below, rows: rows.len(), groups });
         rows.extend(pattern.iter().map(|&row| row as u32));
         rows.resize(supernodes[number].rows + WIDTH * groups, n as u32);
     }
-    let mut values = vec![ZERO; values_len];
+    let mut values = Block::zeros(values_len);
     let mut inverse = vec![0.0; n];
     let (mut below, mut growth, mut pivot_min) = (0, 0.0f64, f64::INFINITY);
     for (number, s) in supernodes.iter().enumerate() {
@@ -240,7 +240,8 @@ fn postorder(parent: &[u32]) -> Vec<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::eigen::block::{Row, dispatch};
+    use crate::eigen::block::{Row, ZERO};
+    use crate::eigen::kernel::{self, Kind};
 
     /// 2 + a diagonal, −1 to the four neighbours on a grid.
     fn grid(side: usize) -> Csr {
@@ -271,13 +272,11 @@ mod tests {
                 let factor = symbolic.factor(shift).unwrap();
                 assert_eq!(factor.below, k);
                 let x: Vec<Row> = (0..=n)
-                    .map(|i| {
-                        Row(std::array::from_fn(|c| if i < n { ((i * 31 + c * 7) % 17) as f64 - 8.0 } else { 0.0 }))
-                    })
+                    .map(|i| std::array::from_fn(|c| if i < n { ((i * 31 + c * 7) % 17) as f64 - 8.0 } else { 0.0 }))
                     .collect();
                 let mut b = vec![ZERO; n + 1];
-                dispatch::sparse(&matrix, &x, &mut b, [1.0, -shift, 0.0]);
-                dispatch::solve(&factor.packed, &mut b);
+                kernel::sparse(Kind::best(), &matrix, &x, &mut b, [1.0, -shift, 0.0]);
+                kernel::solve(Kind::best(), &factor.packed, &mut b);
                 let distance = eigenvalues.iter().map(|l| (l - shift).abs()).fold(f64::INFINITY, f64::min);
                 for i in 0..n {
                     for c in 0..WIDTH {

@@ -1,19 +1,25 @@
 //! The lowest eigenpairs of L φ = λ M φ, with the evidence that they are right and that none is missing.
 //!
-//! In the order of the work: `component` (mass scaled out, one connected component at a time), `factor` (L D Lᵀ and
-//! inertia), `solve` (its solves), `block` (dense products), `lanczos` (one shift), `slice` (the pairs around it),
-//! `assemble` (slices to a spectrum), `spectrum` (how far each component's must go), `finish` (orthogonality, residuals),
-//! `basis` (the merge of all components, on vertices).
+//! In the order of the work: `component` (mass scaled out, one connected component at a time), `spectrum` (how far each
+//! one's spectrum must go), `factor` (L D Lᵀ and inertia), `solve` (its solves), `chain` (shifts, one after another),
+//! `slice` (the pairs around a shift), `krylov` with `projected` and `loss` (the space they are found in), `assemble`
+//! (chains to a spectrum), `finish` (orthogonality, residuals), `output` (eigenvectors on vertices), `basis` (the
+//! result). `block` and `kernel` hold what the time is spent in.
 
 mod assemble;
 mod basis;
-pub(crate) mod block;
+mod block;
+mod chain;
 mod component;
 mod factor;
 mod finish;
-mod lanczos;
+mod kernel;
+mod krylov;
+mod loss;
+mod output;
+mod projected;
 mod slice;
-pub(crate) mod solve;
+mod solve;
 mod spectrum;
 mod weyl;
 
@@ -26,6 +32,7 @@ use crate::operator::Operator;
 pub use basis::{Certificate, Eigenbasis, InertiaCount, Method};
 use component::{Component, DENSE_BELOW, DENSE_SHARE, Pairs};
 use finish::finish;
+use kernel::Kind;
 use spectrum::{keep_lowest, lowest};
 
 /// How many eigenpairs, and how exactly.
@@ -44,11 +51,65 @@ pub struct EigenOptions {
     /// the dense solver. Default 400: a slice solves a dense problem of 250 to 300 itself. The dense solver takes
     /// O(n³) time.
     pub dense_below: usize,
+    /// How far eigenvectors may be from orthonormal. Default [`Orthogonality::Standard`].
+    pub orthogonality: Orthogonality,
+    /// Which instructions to use. Default [`Instructions::Best`]. Bytes are the same for the same instructions.
+    pub instructions: Instructions,
+}
+
+/// How far from orthonormal eigenvectors may be, max |Φᵀ M Φ − I|.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Orthogonality {
+    /// At most 1e-10.
+    #[default]
+    Standard,
+    /// At most 1e-12, for 3 N K² operations more.
+    Full,
+}
+
+impl Orthogonality {
+    /// The largest entry allowed.
+    fn allowed(self) -> f64 {
+        match self {
+            Orthogonality::Standard => 1e-10,
+            Orthogonality::Full => 1e-12,
+        }
+    }
+}
+
+/// Instructions of the processor that the solver's own products are compiled for.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Instructions {
+    /// The best that this processor has.
+    #[default]
+    Best,
+    /// AVX2 and FMA at most.
+    Avx2,
+    /// Those that every processor of the architecture has.
+    Portable,
+}
+
+impl Instructions {
+    fn kind(self) -> Kind {
+        match self {
+            Instructions::Best => Kind::best(),
+            Instructions::Avx2 if Kind::Avx2.is_available() => Kind::Avx2,
+            Instructions::Avx2 | Instructions::Portable => Kind::Portable,
+        }
+    }
 }
 
 impl Default for EigenOptions {
     fn default() -> EigenOptions {
-        EigenOptions { count: 500, tolerance: 1e-10, seed: 1, dense_below: DENSE_BELOW }
+        EigenOptions {
+            count: 500,
+            tolerance: 1e-10,
+            seed: 1,
+            dense_below: DENSE_BELOW,
+            orthogonality: Orthogonality::Standard,
+            instructions: Instructions::Best,
+        }
     }
 }
 
@@ -159,7 +220,8 @@ impl Progress<'_> {
 /// poorer basis. [`EigenError::Stopped`] within about a second of [`Watch::stopped`] (a factorisation of a large mesh
 /// is not interrupted).
 pub fn eigenbasis(operator: &Operator, options: &EigenOptions, watch: &dyn Watch) -> Result<Eigenbasis, EigenError> {
-    let &EigenOptions { count, tolerance, seed, dense_below } = options;
+    let &EigenOptions { count, tolerance, seed, dense_below, orthogonality, instructions } = options;
+    let kind = instructions.kind();
     if count == 0 {
         return Err(EigenError::Option { option: "count", value: 0.0, expected: "at least one eigenpair" });
     }
@@ -185,22 +247,22 @@ pub fn eigenbasis(operator: &Operator, options: &EigenOptions, watch: &dyn Watch
         .filter(|(_, dense)| !**dense)
         .try_for_each(|(component, _)| component.prepare())?;
 
-    let mut solved: Vec<Pairs> = lowest(&components, &dense, count, tolerance.min(1e-8), seed, &progress)?;
+    let mut solved: Vec<Pairs> = lowest(&components, &dense, count, tolerance.min(1e-8), seed, kind, &progress)?;
     let next = keep_lowest(&mut solved, count);
     let evidence = components
         .par_iter()
         .zip(&mut solved)
-        .map(|(component, pairs)| finish(component, pairs))
+        .map(|(component, pairs)| finish(component, pairs, orthogonality, kind, &progress))
         .collect::<Result<Vec<_>, _>>()?;
     if progress.stopped() {
         return Err(EigenError::Stopped);
     }
-    let basis = basis::merge(operator, &components, &solved, &evidence, next, tolerance);
+    let basis = basis::merge(operator, &components, solved, &evidence, next, tolerance);
     let Certificate { residual_max: residual, residual_floor: floor, orthogonality: loss, .. } = basis.certificate;
     if residual.is_nan() || residual > tolerance.max(floor) {
         return Err(EigenError::Residual { residual, tolerance, floor });
     }
-    if loss.is_nan() || loss > 1e-10 {
+    if loss.is_nan() || loss > orthogonality.allowed() {
         return Err(EigenError::NotOrthogonal { loss });
     }
     progress.add(0);

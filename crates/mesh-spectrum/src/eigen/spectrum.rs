@@ -5,7 +5,9 @@
 
 use rayon::prelude::*;
 
+use crate::eigen::block::Pool;
 use crate::eigen::component::{Component, DENSE_SHARE, Pairs, mix};
+use crate::eigen::kernel::Kind;
 use crate::eigen::weyl::Weyl;
 use crate::eigen::{EigenError, Progress};
 
@@ -16,6 +18,7 @@ pub(crate) fn lowest(
     count: usize,
     tolerance: f64,
     seed: u64,
+    kind: Kind,
     progress: &Progress,
 ) -> Result<Vec<Pairs>, EigenError> {
     let solve_dense = |component: &Component| {
@@ -47,7 +50,11 @@ pub(crate) fn lowest(
                 progress.add(below);
                 Ok(pairs)
             }
-            None => component.solve_sliced(top, below, tolerance, mix(seed, number as u64), progress),
+            None => {
+                // Components are of different sizes, so each has blocks of its own.
+                let tools = (kind, &Pool::default());
+                component.solve_sliced(top, below, tolerance, mix(seed, number as u64), tools, progress)
+            }
         })
         .collect()
 }
@@ -141,8 +148,7 @@ pub(crate) fn keep_lowest(solved: &mut [Pairs], count: usize) -> Option<f64> {
 
 impl Pairs {
     fn truncate(&mut self, count: usize) {
-        let rows = self.vectors.len() / self.eigenvalues.len().max(1);
         self.eigenvalues.truncate(count);
-        self.vectors.truncate(count * rows);
+        self.places.truncate(count);
     }
 }
