@@ -55,5 +55,6 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         c.method,
         basis.eigenvalues[basis.eigenvalues.len() - 1],
     );
+    println!("{:.3?}", c.seconds);
     Ok(())
 }

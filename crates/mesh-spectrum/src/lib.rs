@@ -37,8 +37,8 @@ mod operator;
 mod proximity;
 
 pub use eigen::{
-    Certificate, EigenError, EigenOptions, Eigenbasis, InertiaCount, Instructions, Method, Orthogonality, Watch,
-    eigenbasis,
+    Certificate, EigenError, EigenOptions, Eigenbasis, InertiaCount, Instructions, Method, Orthogonality, Seconds,
+    Watch, eigenbasis,
 };
 pub use inspect::{Inspection, inspect};
 pub use join::{Join, JoinError, join};

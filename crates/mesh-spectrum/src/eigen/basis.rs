@@ -5,6 +5,7 @@ use std::ops::Range;
 use crate::eigen::component::{Component, Pairs};
 use crate::eigen::finish::Evidence;
 use crate::eigen::output::eigenvectors;
+use crate::eigen::seconds::Seconds;
 use crate::eigen::slice::ROUNDING;
 use crate::operator::Operator;
 
@@ -56,6 +57,8 @@ pub struct Certificate {
     pub cluster_cut: bool,
     /// Which solver did the work.
     pub method: Method,
+    /// Where the time went. The only part of a basis that differs from run to run.
+    pub seconds: Seconds,
 }
 
 /// Eigenvalues of one component below a shift.
@@ -138,6 +141,7 @@ pub(crate) fn merge(
             } else {
                 Method::Mixed
             },
+            seconds: Seconds::default(),
         },
         eigenvalues,
         eigenvectors,

@@ -94,10 +94,10 @@ pub(crate) fn chain(
         let left = nu.min(end) - below;
         let last = slices == 1 || nu + left.max(half) + half / 3 >= end;
         let right = if last { end.saturating_sub(nu) } else { left.max(half).min(end - nu) };
-        let demand = Demand { left: nu - below, right, last, seed, careful, dimension: dimension.filter(|_| !last) };
+        let demand = Demand { left: nu - below, right, last, seed, careful, dimension };
         let slice = slice(tools, &factor, demand, handover.take())?;
         // What a slice needed is what the next one will need; the first one, without a hand-over, needs more.
-        dimension = Some(if number == 0 { slice.dimension * 4 / 5 } else { slice.dimension - WIDTH });
+        dimension = Some(if number == 0 { slice.dimension * 4 / 5 } else { slice.dimension });
 
         // The slice before knew which eigenvalue comes next. Another one here means that one of both missed a pair.
         let near = |a: f64, b: f64| (a - b).abs() <= 10.0 * tools.tolerance * tools.top;
@@ -165,7 +165,7 @@ fn place_shift(
         if tools.progress.stopped() {
             return Err(EigenError::Stopped.into());
         }
-        let Some(factor) = symbolic.factor(shift) else {
+        let Some(factor) = symbolic.factor(shift, tools.progress) else {
             shift += 0.013 * spacing;
             continue;
         };

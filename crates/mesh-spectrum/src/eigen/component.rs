@@ -101,14 +101,14 @@ impl Component {
 
     /// Eigenvalues below a shift (1/ℓ²), by inertia; `None` if the shift is on one of them, to rounding. The component
     /// must be prepared.
-    pub(crate) fn count_below(&self, shift: f64) -> Option<usize> {
+    pub(crate) fn count_below(&self, shift: f64, progress: &Progress) -> Option<usize> {
         let shift = shift / self.unit;
-        self.factor(shift).filter(|factor| factor.pivot_min > 1e-9 * shift).map(|factor| factor.below)
+        self.factor(shift, progress).filter(|factor| factor.pivot_min > 1e-9 * shift).map(|factor| factor.below)
     }
 
     /// Factors A − σI, both in `unit`.
-    fn factor(&self, shift: f64) -> Option<Factor> {
-        self.symbolic.as_ref().expect("prepared").factor(shift)
+    fn factor(&self, shift: f64, progress: &Progress) -> Option<Factor> {
+        self.symbolic.as_ref().expect("prepared").factor(shift, progress)
     }
 
     /// The null vector v = M^½ 1, normalised.
@@ -189,7 +189,7 @@ impl Component {
     ) -> Result<Pairs, Trouble> {
         let symbolic = self.symbolic.as_ref().expect("prepared");
         let weyl = Weyl::through(self.area * self.unit, top, count as f64);
-        let spans = self.spans(weyl, top, count, attempt, seed)?;
+        let spans = self.spans(weyl, top, count, (attempt, seed), progress)?;
         let tools = Tools { matrix: &self.matrix, pool, kind, progress, top, tolerance };
 
         let n = self.rows();
@@ -222,13 +222,20 @@ impl Component {
     }
 
     /// Chains of about equal length. Where they meet is a value at which the eigenvalues below have been counted.
-    fn spans(&self, weyl: Weyl, top: f64, count: usize, attempt: usize, seed: u64) -> Result<Vec<Span>, Trouble> {
+    fn spans(
+        &self,
+        weyl: Weyl,
+        top: f64,
+        count: usize,
+        (attempt, seed): (usize, u64),
+        progress: &Progress,
+    ) -> Result<Vec<Span>, Trouble> {
         let chains = (count as f64 / PAIRS_A_CHAIN as f64).round().max(1.0) as usize;
         let borders = (1..chains).into_par_iter().map(|i| {
             let number = count as f64 * i as f64 / chains as f64 + 0.3 * attempt as f64;
             let mut at = weyl.inverse(number);
             for _ in 0..4 {
-                if let Some(factor) = self.factor(at).filter(|factor| factor.growth < 1e6) {
+                if let Some(factor) = self.factor(at, progress).filter(|factor| factor.growth < 1e6) {
                     return Ok((at, factor.below));
                 }
                 at += 0.37 * top / count as f64;

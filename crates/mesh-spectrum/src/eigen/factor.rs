@@ -11,9 +11,10 @@ use faer::sparse::linalg::cholesky::{self, SymbolicCholesky, SymbolicCholeskyRaw
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Par, Side};
 
-use crate::eigen::EigenError;
 use crate::eigen::block::{Block, WIDTH};
+use crate::eigen::seconds::Step;
 use crate::eigen::solve::{Packed, Supernode};
+use crate::eigen::{EigenError, Progress};
 use crate::operator::Csr;
 
 /// The pattern of L, the same for every shift. `matrix` is already in elimination order.
@@ -70,7 +71,11 @@ impl Symbolic {
     }
 
     /// Factors A − σI; `None` if a pivot is exactly zero or the result is not finite.
-    pub(crate) fn factor(&self, shift: f64) -> Option<Factor> {
+    pub(crate) fn factor(&self, shift: f64, progress: &Progress) -> Option<Factor> {
+        progress.clock.time(Step::Factor, || self.numeric(shift))
+    }
+
+    fn numeric(&self, shift: f64) -> Option<Factor> {
         let n = self.diagonal.len();
         let mut values = self.values.clone();
         for &place in &self.diagonal {
@@ -269,7 +274,7 @@ mod tests {
             let symbolic = Symbolic::new(&matrix).unwrap();
             for k in [0, n / 3, n - 1] {
                 let shift = if k == 0 { eigenvalues[0] - 0.1 } else { 0.5 * (eigenvalues[k - 1] + eigenvalues[k]) };
-                let factor = symbolic.factor(shift).unwrap();
+                let factor = symbolic.factor(shift, &Progress::new(&(), 0)).unwrap();
                 assert_eq!(factor.below, k);
                 let x: Vec<Row> = (0..=n)
                     .map(|i| std::array::from_fn(|c| if i < n { ((i * 31 + c * 7) % 17) as f64 - 8.0 } else { 0.0 }))

@@ -16,23 +16,24 @@
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use crate::eigen::block::{Block, Pool, Row, SMALL_ZERO, Small, WIDTH, ZERO, cholesky, negative, product, transpose};
+use crate::eigen::block::{Block, Row, SMALL_ZERO, Small, WIDTH, ZERO, cholesky, negative, product, transpose};
 use crate::eigen::factor::Factor;
-use crate::eigen::kernel::{self, Kind, gram_of};
+use crate::eigen::kernel::{self, gram_of};
 use crate::eigen::loss::{Loss, uniform};
 use crate::eigen::projected::{Projected, Ritz};
+use crate::eigen::seconds::Step;
+use crate::eigen::slice::Tools;
 
 /// The loss of orthogonality at which a basis is repaired. What is lost by then goes into the vectors' residuals.
 const LOSS_MAX: f64 = 1e-9;
 
 /// A measured loss above this says that the estimate cannot be trusted: from there on every block is orthogonalised.
-const LOSS_TRUSTED: f64 = 1e-8;
+const LOSS_TRUSTED: f64 = 3e-8;
 
 /// A Krylov space around one shift, growing by a block a step.
 pub(crate) struct Krylov<'a> {
+    tools: Tools<'a>,
     factor: &'a Factor,
-    pool: &'a Pool,
-    kind: Kind,
     n: usize,
     /// X, then Q_1 .. Q_{m+1}; n + 1 rows each, the last one scratch.
     basis: Vec<Block>,
@@ -71,17 +72,17 @@ pub(crate) struct Handover {
 impl<'a> Krylov<'a> {
     /// Starts from what another space left, or from eight random vectors. `careful`: orthogonalise at every step.
     pub(crate) fn new(
-        (factor, pool, kind): (&'a Factor, &'a Pool, Kind),
-        n: usize,
+        tools: Tools<'a>,
+        factor: &'a Factor,
         seed: u64,
         handover: Option<Handover>,
         careful: bool,
     ) -> Krylov<'a> {
+        let n = tools.matrix.rows();
         let kept = handover.as_ref().map_or(0, |handover| handover.theta.len());
         let mut space = Krylov {
+            tools,
             factor,
-            pool,
-            kind,
             n,
             basis: Vec::new(),
             kept,
@@ -108,9 +109,9 @@ impl<'a> Krylov<'a> {
             space.basis = x;
             space.basis.push(q);
         } else {
-            let mut start = pool.take(n + 1);
+            let mut start = tools.pool.take(n + 1);
             start[..n].iter_mut().for_each(|row| *row = std::array::from_fn(|_| uniform(&mut space.random)));
-            let square = gram_of(kind, &start[..n], &start[..n]);
+            let square = gram_of(tools.kind, &start[..n], &start[..n]);
             space.orthonormalise(&mut start, square);
             space.basis.push(start);
         }
@@ -130,11 +131,17 @@ impl<'a> Krylov<'a> {
 
     /// Grows the space by one block.
     pub(crate) fn step(&mut self) {
-        let (n, kind, last) = (self.n, self.kind, self.basis.len() - 1);
-        let mut w = self.pool.take(n + 1);
+        let (n, kind, last) = (self.n, self.tools.kind, self.basis.len() - 1);
+        let clock = &self.tools.progress.clock;
+        let mut w = self.tools.pool.take(n + 1);
         w.copy_from_slice(&self.basis[last]);
-        kernel::solve(kind, &self.factor.packed, &mut w);
+        clock.time(Step::Solve, || kernel::solve(kind, &self.factor.packed, &mut w));
+        clock.time(Step::Orthogonalise, || self.recur(w));
+    }
 
+    /// Orthogonalises Op Q_j and takes it into the basis.
+    fn recur(&mut self, mut w: Block) {
+        let (n, kind, last) = (self.n, self.tools.kind, self.basis.len() - 1);
         // X is coupled to the first two blocks. Later the three-term recurrence removes all but rounding.
         let coupled = self.kept > 0 && self.steps < 2;
         let mut alpha = SMALL_ZERO;
@@ -202,6 +209,9 @@ impl<'a> Krylov<'a> {
                 let both = dot(c_x(i), &self.start[j].g) + dot(c_x(j), &start.g); // symmetric but for rounding
                 self.projected.set(i, j, 0.5 * self.moved * both + if i == j { start.value } else { 0.0 });
             }
+            // Qᵀ Op₂ X is known twice.
+            let known = |a: usize| start.g[a] + self.moved * dot(&alpha[a], &start.g);
+            self.loss.inherit((0..WIDTH).map(|a| (known(a) - c_x(i)[a]).abs()).fold(0.0, f64::max));
             for (a, r) in r.iter().enumerate() {
                 self.projected.set(at + a, i, c_x(i)[a]);
                 self.projected.set(at + WIDTH + a, i, self.moved * dot(r, &start.g));
@@ -213,26 +223,26 @@ impl<'a> Krylov<'a> {
     fn orthogonalise(&self, w: &mut [Row]) -> Vec<Small> {
         let blocks: Vec<&[Row]> = self.basis.iter().map(|block| &block[..self.n]).collect();
         let mut c = vec![SMALL_ZERO; blocks.len()];
-        kernel::gram(self.kind, &blocks, &[&w[..self.n]], &mut c);
+        kernel::gram(self.tools.kind, &blocks, &[&w[..self.n]], &mut c);
         let minus: Vec<Small> = c.iter().map(negative).collect();
-        kernel::update(self.kind, &blocks, &minus, &mut [&mut w[..self.n]], true);
+        kernel::update(self.tools.kind, &blocks, &minus, &mut [&mut w[..self.n]], true);
         c
     }
 
-    /// Makes the last block and the new one orthogonal to all before them: both, because the recurrence goes on from
-    /// both, and together, because the basis is then read once.
+    /// Makes the last block and the new one orthogonal to all before them:
+    /// both, because the recurrence goes on from both, and together, because the basis is then read once.
     fn repair(&mut self, w: &mut [Row]) {
-        let n = self.n;
+        let (n, kind) = (self.n, self.tools.kind);
         let Some((last, earlier)) = self.basis.split_last_mut() else { return };
         let blocks: Vec<&[Row]> = earlier.iter().map(|block| &block[..n]).collect();
         let mut c = vec![SMALL_ZERO; 2 * blocks.len()];
-        kernel::gram(self.kind, &blocks, &[&last[..n], &w[..n]], &mut c);
+        kernel::gram(kind, &blocks, &[&last[..n], &w[..n]], &mut c);
         let measured = c.as_flattened().as_flattened().iter().fold(0.0f64, |most, c| most.max(c.abs()));
         self.every_step |= measured > LOSS_TRUSTED;
         let minus: Vec<Small> = c.iter().map(negative).collect();
-        kernel::update(self.kind, &blocks, &minus, &mut [&mut last[..n], &mut w[..n]], true);
-        let between = negative(&gram_of(self.kind, &last[..n], &w[..n]));
-        kernel::update(self.kind, &[&last[..n]], &[between], &mut [&mut w[..n]], true);
+        kernel::update(kind, &blocks, &minus, &mut [&mut last[..n], &mut w[..n]], true);
+        let between = negative(&gram_of(kind, &last[..n], &w[..n]));
+        kernel::update(kind, &[&last[..n]], &[between], &mut [&mut w[..n]], true);
     }
 
     /// W = Q R with R upper triangular; W becomes Q. `square` is Wᵀ W. Cholesky of it, again while R is ill-conditioned
@@ -249,7 +259,7 @@ impl<'a> Krylov<'a> {
             if most <= 1e-13 * self.scale {
                 break; // an invariant subspace: what is left of W is rounding
             }
-            kernel::scale(self.kind, &inverse, &mut w[..n]);
+            kernel::scale(self.tools.kind, &inverse, &mut w[..n]);
             total = Some(total.map_or(r, |total| product(&r, &total)));
             if most / least < 50.0 {
                 return total.unwrap_or(r);
@@ -258,7 +268,7 @@ impl<'a> Krylov<'a> {
             if most / least > 1e6 {
                 self.orthogonalise(w);
             }
-            square = gram_of(self.kind, &w[..n], &w[..n]);
+            square = gram_of(self.tools.kind, &w[..n], &w[..n]);
         }
         let rounding = if total.is_none() { 1e-12 * self.scale } else { 0.0 };
         let r = self.fill_up(w, rounding);
@@ -305,7 +315,7 @@ impl<'a> Krylov<'a> {
 
     /// Eigenpairs of the projected operator; `None` if they cannot be computed (not finite).
     pub(crate) fn ritz(&self) -> Option<Ritz> {
-        self.projected.ritz(self.dimension())
+        self.tools.progress.clock.time(Step::Project, || self.projected.ritz(self.dimension()))
     }
 
     /// Ritz vectors of the chosen columns into blocks of eight (the last one filled up with zeros), with one step of
@@ -331,12 +341,13 @@ impl<'a> Krylov<'a> {
                 }
             }
         }
-        kernel::update(self.kind, &blocks, &c, into, false);
+        let clock = &self.tools.progress.clock;
+        clock.time(Step::Vectors, || kernel::update(self.tools.kind, &blocks, &c, into, false));
     }
 
     /// Ends the space and leaves the chosen Ritz vectors, a multiple of eight, to the next one.
     pub(crate) fn hand_over(mut self, ritz: &Ritz, chosen: &[usize]) -> Handover {
-        let mut x: Vec<Block> = chosen.chunks(WIDTH).map(|_| self.pool.take(self.n + 1)).collect();
+        let mut x: Vec<Block> = chosen.chunks(WIDTH).map(|_| self.tools.pool.take(self.n + 1)).collect();
         let mut into: Vec<&mut [Row]> = x.iter_mut().map(|x| &mut x[..self.n]).collect();
         self.combine(ritz, chosen, false, &mut into);
         let q = self.basis.pop().unwrap_or_else(|| unreachable!("a basis has a block"));
@@ -352,7 +363,7 @@ impl<'a> Krylov<'a> {
 
 impl Drop for Krylov<'_> {
     fn drop(&mut self) {
-        self.pool.give(self.basis.drain(..));
+        self.tools.pool.give(self.basis.drain(..));
     }
 }
 

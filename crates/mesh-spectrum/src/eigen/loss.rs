@@ -25,6 +25,8 @@ pub(crate) struct Loss {
     now: Vec<Row>,
     before: Vec<Row>,
     noise: f64,
+    /// For each column that the space started with, the error of what is known of its product with Op.
+    inherited: Vec<f64>,
     scale: f64,
 }
 
@@ -40,12 +42,19 @@ impl Loss {
 
     /// Notes the asymmetry of a computed α.
     pub(crate) fn measure(&mut self, alpha: &Small) {
+        // The first blocks are long in the directions that solves lose most in; their noise is soon gone.
+        self.noise *= 0.3;
         for i in 0..WIDTH {
             for k in 0..i {
                 self.noise = self.noise.max((alpha[i][k] - alpha[k][i]).abs());
             }
             self.scale = self.scale.max(alpha[i][i].abs());
         }
+    }
+
+    /// Notes by how much the product with a column that the space started with is not what it was taken for.
+    pub(crate) fn inherit(&mut self, error: f64) {
+        self.inherited.push(error);
     }
 
     /// Follows the step that added a block: its α, the R before it and the R after it. Result: the largest entry.
@@ -64,7 +73,8 @@ impl Loss {
         let mut most = 0.0f64;
         for k in 0..columns {
             // F, uniform in ± twice the noise.
-            let mut sum = noise(2.0 * self.noise + ROUNDING * self.scale, random);
+            let inherited = self.inherited.get(k).copied().unwrap_or(0.0);
+            let mut sum = noise(2.0 * self.noise.max(inherited) + ROUNDING * self.scale, random);
             let coupled = projected.coupled_to(k);
             let end = coupled.end.min(self.now.len());
             for (h, omega) in projected.row(k)[coupled.start..end].iter().zip(&self.now[coupled.start..end]) {

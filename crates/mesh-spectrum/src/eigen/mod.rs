@@ -18,6 +18,7 @@ mod krylov;
 mod loss;
 mod output;
 mod projected;
+mod seconds;
 mod slice;
 mod solve;
 mod spectrum;
@@ -33,6 +34,8 @@ pub use basis::{Certificate, Eigenbasis, InertiaCount, Method};
 use component::{Component, DENSE_BELOW, DENSE_SHARE, Pairs};
 use finish::finish;
 use kernel::Kind;
+pub use seconds::Seconds;
+use seconds::{Clock, Step};
 use spectrum::{keep_lowest, lowest};
 
 /// How many eigenpairs, and how exactly.
@@ -192,9 +195,14 @@ pub(crate) struct Progress<'a> {
     watch: &'a dyn Watch,
     done: AtomicUsize,
     total: usize,
+    pub(crate) clock: Clock,
 }
 
-impl Progress<'_> {
+impl<'a> Progress<'a> {
+    pub(crate) fn new(watch: &'a dyn Watch, total: usize) -> Progress<'a> {
+        Progress { watch, done: AtomicUsize::new(0), total, clock: Clock::default() }
+    }
+
     pub(crate) fn stopped(&self) -> bool {
         self.watch.stopped()
     }
@@ -229,9 +237,10 @@ pub fn eigenbasis(operator: &Operator, options: &EigenOptions, watch: &dyn Watch
         return Err(EigenError::Option { option: "tolerance", value: tolerance, expected: "between 0 and 0.01" });
     }
     let count = count.min(operator.mass.len());
-    let progress = Progress { watch, done: AtomicUsize::new(0), total: count };
+    let progress = Progress::new(watch, count);
+    let clock = &progress.clock;
 
-    let mut components = split(operator)?;
+    let mut components = clock.time(Step::Order, || split(operator))?;
     let area: f64 = operator.mass.iter().sum();
     // The share of the pairs that Weyl's law gives a component, with a fifth to spare.
     let expected = |component: &Component| 1.2 * component.area / area * count as f64 + 2.0;
@@ -245,19 +254,23 @@ pub fn eigenbasis(operator: &Operator, options: &EigenOptions, watch: &dyn Watch
         .par_iter_mut()
         .zip(&dense)
         .filter(|(_, dense)| !**dense)
-        .try_for_each(|(component, _)| component.prepare())?;
+        .try_for_each(|(component, _)| clock.time(Step::Order, || component.prepare()))?;
 
     let mut solved: Vec<Pairs> = lowest(&components, &dense, count, tolerance.min(1e-8), seed, kind, &progress)?;
     let next = keep_lowest(&mut solved, count);
     let evidence = components
         .par_iter()
         .zip(&mut solved)
-        .map(|(component, pairs)| finish(component, pairs, orthogonality, kind, &progress))
+        .map(|(component, pairs)| {
+            clock.time(Step::Certify, || finish(component, pairs, orthogonality, kind, &progress))
+        })
         .collect::<Result<Vec<_>, _>>()?;
     if progress.stopped() {
         return Err(EigenError::Stopped);
     }
-    let basis = basis::merge(operator, &components, solved, &evidence, next, tolerance);
+    let mut basis =
+        clock.time(Step::Output, || basis::merge(operator, &components, solved, &evidence, next, tolerance));
+    basis.certificate.seconds = clock.seconds();
     let Certificate { residual_max: residual, residual_floor: floor, orthogonality: loss, .. } = basis.certificate;
     if residual.is_nan() || residual > tolerance.max(floor) {
         return Err(EigenError::Residual { residual, tolerance, floor });

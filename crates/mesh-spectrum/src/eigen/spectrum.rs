@@ -95,7 +95,7 @@ fn top(
             .zip(solved)
             .map(|(component, solved)| match solved {
                 Some(pairs) => Some(pairs.eigenvalues.iter().filter(|&&e| e < at).count()),
-                None => component.count_below(at),
+                None => component.count_below(at, progress),
             })
             .collect();
         let Some(below) = counts else {
