@@ -7,7 +7,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use mesh_spectrum::{
-    EigenError, EigenOptions, Mesh, OperatorOptions, Seconds, Watch, eigenbasis, inspect, join, operator,
+    EigenError, EigenOptions, Instructions, Mesh, OperatorOptions, Orthogonality, Seconds, Watch, eigenbasis, inspect,
+    join, operator,
 };
 use proptest::prelude::*;
 use zoo::{build, copies, rough};
@@ -19,7 +20,8 @@ fn the_same_bytes_at_any_number_of_threads() {
     let solve = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let mut basis = pool.install(|| eigenbasis(&built, &options, &()).unwrap());
-        basis.certificate.seconds = Seconds::default();
+        // What may differ: seconds, and the memory that so many threads need.
+        (basis.certificate.seconds, basis.certificate.peak_bytes) = (Seconds::default(), 0);
         basis
     };
     let one = solve(1);
@@ -157,4 +159,38 @@ proptest! {
             Err(error) => prop_assert!(!error.to_string().is_empty()),
         }
     }
+}
+
+#[test]
+fn what_cannot_fit_is_refused_before_it_is_tried() {
+    let built = build(rough(60, 50));
+    let needed = eigenbasis(&built, &EigenOptions { count: 100, ..Default::default() }, &()).unwrap();
+    let needed = needed.certificate.peak_bytes;
+    // The result and a factor at least; not more than a few spaces of 500 columns.
+    assert!((8 * 100 * 3111..100_000_000).contains(&needed), "{needed}");
+    for limit in [1000, needed - 1] {
+        let options = EigenOptions { count: 100, memory_limit: Some(limit), ..Default::default() };
+        assert!(matches!(eigenbasis(&built, &options, &()), Err(EigenError::TooLittleMemory { .. })));
+    }
+    let enough = EigenOptions { count: 100, memory_limit: Some(needed), ..Default::default() };
+    assert!(eigenbasis(&built, &enough, &()).is_ok());
+}
+
+#[test]
+fn every_kind_of_instructions_gives_the_same_spectrum() {
+    let built = build(rough(40, 25));
+    let solve = |instructions| zoo::checked(&built, &EigenOptions { count: 150, instructions, ..Default::default() });
+    let best = solve(Instructions::Best);
+    for instructions in [Instructions::Avx2, Instructions::Portable] {
+        let other = solve(instructions);
+        assert!(zoo::distance(&best.eigenvalues, &other.eigenvalues) < 1e-11);
+        assert!(zoo::subspace_distance(&best, &other, &built.vertex_mass, 1e-5) < 1e-9);
+    }
+}
+
+#[test]
+fn full_orthogonality_is_full() {
+    let built = build(rough(60, 50));
+    let options = EigenOptions { count: 300, orthogonality: Orthogonality::Full, ..Default::default() };
+    assert!(zoo::checked(&built, &options).certificate.orthogonality <= 1e-12);
 }

@@ -57,6 +57,12 @@ pub struct Certificate {
     pub cluster_cut: bool,
     /// Which solver did the work.
     pub method: Method,
+    /// Factorisations, for shifts and for counts.
+    pub factorisations: usize,
+    /// Right-hand sides solved for.
+    pub solves: usize,
+    /// Bytes that the computation was expected to need at most, with the result.
+    pub peak_bytes: usize,
     /// Where the time went. The only part of a basis that differs from run to run.
     pub seconds: Seconds,
 }
@@ -141,6 +147,9 @@ pub(crate) fn merge(
             } else {
                 Method::Mixed
             },
+            factorisations: 0,
+            solves: 0,
+            peak_bytes: 0,
             seconds: Seconds::default(),
         },
         eigenvalues,

@@ -99,6 +99,17 @@ impl Component {
         self.dofs.len()
     }
 
+    /// Bytes of the matrix and of what was prepared for its factors.
+    pub(crate) fn bytes(&self) -> usize {
+        let matrix = 12 * self.matrix.columns.len() + 40 * self.rows();
+        matrix + self.symbolic.as_ref().map_or(0, Symbolic::bytes)
+    }
+
+    /// Bytes of one factorisation at its largest.
+    pub(crate) fn factor_bytes(&self) -> usize {
+        self.symbolic.as_ref().map_or(0, Symbolic::factor_bytes)
+    }
+
     /// Eigenvalues below a shift (1/ℓ²), by inertia; `None` if the shift is on one of them, to rounding. The component
     /// must be prepared.
     pub(crate) fn count_below(&self, shift: f64, progress: &Progress) -> Option<usize> {
@@ -230,7 +241,7 @@ impl Component {
         (attempt, seed): (usize, u64),
         progress: &Progress,
     ) -> Result<Vec<Span>, Trouble> {
-        let chains = (count as f64 / PAIRS_A_CHAIN as f64).round().max(1.0) as usize;
+        let chains = chains(count);
         let borders = (1..chains).into_par_iter().map(|i| {
             let number = count as f64 * i as f64 / chains as f64 + 0.3 * attempt as f64;
             let mut at = weyl.inverse(number);
@@ -264,6 +275,11 @@ impl Component {
         }
         Ok(spans)
     }
+}
+
+/// How many chains find so many pairs.
+pub(crate) fn chains(pairs: usize) -> usize {
+    (pairs as f64 / PAIRS_A_CHAIN as f64).round().max(1.0) as usize
 }
 
 /// A new seed for a part of the work (Steele, Lea and Flood 2014: SplitMix).

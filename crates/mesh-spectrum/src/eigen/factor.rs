@@ -70,6 +70,17 @@ impl Symbolic {
         }
     }
 
+    /// Bytes of the pattern.
+    pub(crate) fn bytes(&self) -> usize {
+        24 * self.values.len() + 24 * self.start.len() + 4 * self.supernodes().len_val()
+    }
+
+    /// Bytes of a factor while it is repacked: the library's, ours (a quarter larger, as groups are filled up), and a
+    /// copy of the matrix.
+    pub(crate) fn factor_bytes(&self) -> usize {
+        18 * self.supernodes().len_val() + 8 * self.values.len() + 32 * self.start.len()
+    }
+
     /// Factors A − σI; `None` if a pivot is exactly zero or the result is not finite.
     pub(crate) fn factor(&self, shift: f64, progress: &Progress) -> Option<Factor> {
         progress.clock.time(Step::Factor, || self.numeric(shift))

@@ -16,6 +16,7 @@ mod finish;
 mod kernel;
 mod krylov;
 mod loss;
+mod memory;
 mod output;
 mod projected;
 mod seconds;
@@ -31,6 +32,7 @@ use thiserror::Error;
 
 use crate::operator::Operator;
 pub use basis::{Certificate, Eigenbasis, InertiaCount, Method};
+use block::WIDTH;
 use component::{Component, DENSE_BELOW, DENSE_SHARE, Pairs};
 use finish::finish;
 use kernel::Kind;
@@ -58,6 +60,8 @@ pub struct EigenOptions {
     pub orthogonality: Orthogonality,
     /// Which instructions to use. Default [`Instructions::Best`]. Bytes are the same for the same instructions.
     pub instructions: Instructions,
+    /// Bytes that may be used, with the result. Default `None`: what the system says is available, where it says so.
+    pub memory_limit: Option<usize>,
 }
 
 /// How far from orthonormal eigenvectors may be, max |Φᵀ M Φ − I|.
@@ -112,6 +116,7 @@ impl Default for EigenOptions {
             dense_below: DENSE_BELOW,
             orthogonality: Orthogonality::Standard,
             instructions: Instructions::Best,
+            memory_limit: None,
         }
     }
 }
@@ -159,6 +164,16 @@ pub enum EigenError {
     OutOfMemory {
         /// Degrees of freedom of the component.
         dofs: usize,
+    },
+    /// The computation would need more memory than there is.
+    #[error(
+        "about {needed_mb} MB are needed and {available_mb} MB may be used; ask for fewer eigenpairs, use fewer threads, or a coarser mesh"
+    )]
+    TooLittleMemory {
+        /// Expected at most, 10⁶ bytes.
+        needed_mb: usize,
+        /// The limit given, or what the system has available, 10⁶ bytes.
+        available_mb: usize,
     },
     /// Pairs are missing after all attempts. Nothing is returned, because a spectrum with holes looks like one without.
     #[error("{found} of {wanted} eigenpairs found: {detail}; try another seed, or fewer pairs")]
@@ -228,7 +243,7 @@ impl<'a> Progress<'a> {
 /// poorer basis. [`EigenError::Stopped`] within about a second of [`Watch::stopped`] (a factorisation of a large mesh
 /// is not interrupted).
 pub fn eigenbasis(operator: &Operator, options: &EigenOptions, watch: &dyn Watch) -> Result<Eigenbasis, EigenError> {
-    let &EigenOptions { count, tolerance, seed, dense_below, orthogonality, instructions } = options;
+    let &EigenOptions { count, tolerance, seed, dense_below, orthogonality, instructions, memory_limit } = options;
     let kind = instructions.kind();
     if count == 0 {
         return Err(EigenError::Option { option: "count", value: 0.0, expected: "at least one eigenpair" });
@@ -240,6 +255,8 @@ pub fn eigenbasis(operator: &Operator, options: &EigenOptions, watch: &dyn Watch
     let progress = Progress::new(watch, count);
     let clock = &progress.clock;
 
+    // The result alone, before anything is built.
+    memory::check(count.saturating_mul(operator.vertex_mass.len()).saturating_mul(8), memory_limit)?;
     let mut components = clock.time(Step::Order, || split(operator))?;
     let area: f64 = operator.mass.iter().sum();
     // The share of the pairs that Weyl's law gives a component, with a fifth to spare.
@@ -256,6 +273,8 @@ pub fn eigenbasis(operator: &Operator, options: &EigenOptions, watch: &dyn Watch
         .filter(|(_, dense)| !**dense)
         .try_for_each(|(component, _)| clock.time(Step::Order, || component.prepare()))?;
 
+    let expected = memory::expected(&components, &dense, count, operator.vertex_mass.len());
+    memory::check(expected, memory_limit)?;
     let mut solved: Vec<Pairs> = lowest(&components, &dense, count, tolerance.min(1e-8), seed, kind, &progress)?;
     let next = keep_lowest(&mut solved, count);
     let evidence = components
@@ -271,6 +290,9 @@ pub fn eigenbasis(operator: &Operator, options: &EigenOptions, watch: &dyn Watch
     let mut basis =
         clock.time(Step::Output, || basis::merge(operator, &components, solved, &evidence, next, tolerance));
     basis.certificate.seconds = clock.seconds();
+    basis.certificate.factorisations = clock.times(Step::Factor);
+    basis.certificate.solves = WIDTH * clock.times(Step::Solve);
+    basis.certificate.peak_bytes = expected;
     let Certificate { residual_max: residual, residual_floor: floor, orthogonality: loss, .. } = basis.certificate;
     if residual.is_nan() || residual > tolerance.max(floor) {
         return Err(EigenError::Residual { residual, tolerance, floor });

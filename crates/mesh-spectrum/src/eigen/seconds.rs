@@ -1,6 +1,6 @@
 //! Where the time goes.
 
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::time::Instant;
 
 /// Wall seconds of each step, summed over threads: on two threads they add up to twice the time that passes.
@@ -37,9 +37,9 @@ pub(crate) enum Step {
     Output,
 }
 
-/// Nanoseconds of each step so far, from all threads.
+/// Nanoseconds of each step so far, from all threads, and how often it was done.
 #[derive(Debug, Default)]
-pub(crate) struct Clock([AtomicU64; 8]);
+pub(crate) struct Clock([(AtomicU64, AtomicUsize); 8]);
 
 impl Clock {
     /// Does something and counts how long it took.
@@ -47,13 +47,20 @@ impl Clock {
         let start = Instant::now();
         let result = work();
         let passed = u64::try_from(start.elapsed().as_nanos()).unwrap_or(u64::MAX);
-        self.0[step as usize].fetch_add(passed, Ordering::Relaxed);
+        let (time, times) = &self.0[step as usize];
+        time.fetch_add(passed, Ordering::Relaxed);
+        times.fetch_add(1, Ordering::Relaxed);
         result
+    }
+
+    /// How often a step was done.
+    pub(crate) fn times(&self, step: Step) -> usize {
+        self.0[step as usize].1.load(Ordering::Relaxed)
     }
 
     pub(crate) fn seconds(&self) -> Seconds {
         let [order, factor, solve, orthogonalise, project, vectors, certify, output] =
-            self.0.each_ref().map(|time| time.load(Ordering::Relaxed) as f64 * 1e-9);
+            self.0.each_ref().map(|(time, _)| time.load(Ordering::Relaxed) as f64 * 1e-9);
         Seconds { order, factor, solve, orthogonalise, project, vectors, certify, output }
     }
 }
