@@ -15,20 +15,23 @@ use zoo::{build, copies, rough};
 
 #[test]
 fn the_same_bytes_at_any_number_of_threads() {
-    let built = build(copies(&rough(40, 25), 2, 40.0));
-    let options = EigenOptions { count: 200, ..Default::default() };
-    let solve = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let mut basis = pool.install(|| eigenbasis(&built, &options, &()).unwrap());
-        // What may differ: seconds, and the memory that so many threads need.
-        (basis.certificate.seconds, basis.certificate.peak_bytes) = (Seconds::default(), 0);
-        basis
-    };
-    let one = solve(1);
-    for threads in [1, 2, 5] {
-        let other = solve(threads);
-        assert!(one.eigenvectors.iter().zip(&other.eigenvectors).all(|(a, b)| a.to_bits() == b.to_bits()));
-        assert_eq!(one, other);
+    // Two components with one chain of slices each; one component with two chains.
+    for (parts, count) in [(copies(&rough(40, 25), 2, 40.0), 200), (rough(60, 40), 500)] {
+        let built = build(parts);
+        let options = EigenOptions { count, ..Default::default() };
+        let solve = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let mut basis = pool.install(|| eigenbasis(&built, &options, &()).unwrap());
+            // What may differ: seconds, and the memory that so many threads need.
+            (basis.certificate.seconds, basis.certificate.peak_bytes) = (Seconds::default(), 0);
+            basis
+        };
+        let one = solve(1);
+        for threads in [1, 2, 5] {
+            let other = solve(threads);
+            assert!(one.eigenvectors.iter().zip(&other.eigenvectors).all(|(a, b)| a.to_bits() == b.to_bits()));
+            assert_eq!(one, other);
+        }
     }
 }
 
@@ -62,6 +65,9 @@ impl Watch for Log {
     fn step(&self, stage: &'static str, done: usize, total: usize) {
         assert_eq!(stage, "eigenpairs");
         self.0.lock().unwrap().push((done, total));
+    }
+    fn slices(&self, done: usize, expected: usize) {
+        assert!(1 <= done && done <= expected);
     }
 }
 

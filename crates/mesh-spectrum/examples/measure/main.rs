@@ -82,7 +82,10 @@ fn dump(operator: &Operator, folder: &Path) -> Result<(), Box<dyn Error>> {
     std::fs::create_dir_all(folder)?;
     let l = &operator.stiffness;
     let bytes = |values: &[f64]| values.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
-    std::fs::write(folder.join("start.i64"), l.start.iter().flat_map(|&x| (x as i64).to_le_bytes()).collect::<Vec<_>>())?;
+    std::fs::write(
+        folder.join("start.i64"),
+        l.start.iter().flat_map(|&x| (x as i64).to_le_bytes()).collect::<Vec<_>>(),
+    )?;
     std::fs::write(folder.join("columns.i32"), l.columns.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<_>>())?;
     std::fs::write(folder.join("values.f64"), bytes(&l.values))?;
     std::fs::write(folder.join("mass.f64"), bytes(&operator.mass))?;

@@ -59,6 +59,11 @@ pub(crate) fn blocks_needed(pairs: usize) -> usize {
     pairs.div_ceil(WIDTH) + slices_max(pairs)
 }
 
+/// About so many slices find so many pairs.
+pub(crate) fn slices_expected(pairs: usize) -> usize {
+    ((pairs as f64 / (2 * PAIRS_A_SIDE) as f64).round() as usize).max(1)
+}
+
 fn slices_max(pairs: usize) -> usize {
     pairs / PAIRS_A_SIDE + 4
 }
@@ -81,7 +86,7 @@ pub(crate) fn chain(
     let (mut below, mut low) = (first, low);
     for number in 0..slices_max(end - first) {
         let left_over = end - below;
-        let slices = (left_over as f64 / (2 * PAIRS_A_SIDE) as f64).round().max(1.0) as usize;
+        let slices = slices_expected(left_over);
         let half = left_over.div_ceil(2 * slices).max(2);
         let wanted = guess(&ahead, half).unwrap_or_else(|| {
             let place = weyl.inverse((below + half) as f64) - weyl.inverse(below as f64);
@@ -120,7 +125,7 @@ pub(crate) fn chain(
         found.eigenvalues.extend(&slice.eigenvalues);
         next_block += used;
         below += count;
-        tools.progress.add(count.min(left + right));
+        tools.progress.slice(count.min(left + right));
         if last {
             found.eigenvalues.truncate(end - first);
             found.places.truncate(end - first);

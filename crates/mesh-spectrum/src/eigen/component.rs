@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use crate::eigen::assemble::{assemble, check_counts};
 use crate::eigen::block::{Block, Pool, Row, WIDTH};
-use crate::eigen::chain::{Found, Span, blocks_needed, chain};
+use crate::eigen::chain::{Found, Span, blocks_needed, chain, slices_expected};
 use crate::eigen::factor::{Factor, Symbolic, elimination_order, permuted};
 use crate::eigen::kernel::Kind;
 use crate::eigen::slice::{Tools, Trouble, norm};
@@ -174,7 +174,7 @@ impl Component {
         let mut detail = String::new();
         for attempt in 0..4 {
             let seed = mix(seed, attempt);
-            match self.attempt(top / self.unit, count, tolerance, seed, attempt as usize, (kind, pool), progress) {
+            match self.attempt(top / self.unit, count, tolerance, (attempt as usize, seed), (kind, pool), progress) {
                 Ok(mut pairs) => {
                     pairs.eigenvalues.iter_mut().for_each(|e| *e *= self.unit);
                     pairs.counts.iter_mut().for_each(|(shift, ..)| *shift *= self.unit);
@@ -193,8 +193,7 @@ impl Component {
         top: f64,
         count: usize,
         tolerance: f64,
-        seed: u64,
-        attempt: usize,
+        (attempt, seed): (usize, u64),
         (kind, pool): (Kind, &Pool),
         progress: &Progress,
     ) -> Result<Pairs, Trouble> {
@@ -202,6 +201,8 @@ impl Component {
         let weyl = Weyl::through(self.area * self.unit, top, count as f64);
         let spans = self.spans(weyl, top, count, (attempt, seed), progress)?;
         let tools = Tools { matrix: &self.matrix, pool, kind, progress, top, tolerance };
+
+        progress.expect_slices(spans.iter().map(|span| slices_expected(span.end - span.first)).sum());
 
         let n = self.rows();
         let needed: Vec<usize> = spans.iter().map(|span| blocks_needed(span.end - span.first)).collect();

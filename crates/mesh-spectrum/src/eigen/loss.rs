@@ -44,11 +44,9 @@ impl Loss {
     pub(crate) fn measure(&mut self, alpha: &Small) {
         // The first blocks are long in the directions that solves lose most in; their noise is soon gone.
         self.noise *= 0.3;
-        for i in 0..WIDTH {
-            for k in 0..i {
-                self.noise = self.noise.max((alpha[i][k] - alpha[k][i]).abs());
-            }
-            self.scale = self.scale.max(alpha[i][i].abs());
+        for ((i, row), turned) in alpha.iter().enumerate().zip(transpose(alpha)) {
+            self.noise = row.iter().zip(turned).fold(self.noise, |most, (a, b)| most.max((a - b).abs()));
+            self.scale = self.scale.max(row[i].abs());
         }
     }
 

@@ -125,6 +125,9 @@ impl Default for EigenOptions {
 pub trait Watch: Sync {
     /// `done` of `total` units of a stage are done.
     fn step(&self, _stage: &'static str, _done: usize, _total: usize) {}
+    /// `done` of about `expected` slices of the spectrum are done; the second grows when one has to be tried again.
+    /// Together with the seconds that have passed, an estimate of those that are left.
+    fn slices(&self, _done: usize, _expected: usize) {}
     /// Asked often; once it says true, the computation ends with [`EigenError::Stopped`].
     fn stopped(&self) -> bool {
         false
@@ -210,12 +213,27 @@ pub(crate) struct Progress<'a> {
     watch: &'a dyn Watch,
     done: AtomicUsize,
     total: usize,
+    slices: AtomicUsize,
+    slices_expected: AtomicUsize,
     pub(crate) clock: Clock,
 }
 
 impl<'a> Progress<'a> {
     pub(crate) fn new(watch: &'a dyn Watch, total: usize) -> Progress<'a> {
-        Progress { watch, done: AtomicUsize::new(0), total, clock: Clock::default() }
+        let zero = AtomicUsize::default;
+        Progress { watch, done: zero(), total, slices: zero(), slices_expected: zero(), clock: Clock::default() }
+    }
+
+    /// So many slices more are going to be computed.
+    pub(crate) fn expect_slices(&self, slices: usize) {
+        self.slices_expected.fetch_add(slices, Ordering::Relaxed);
+    }
+
+    /// A slice is done, and with it so many pairs.
+    pub(crate) fn slice(&self, pairs: usize) {
+        let done = self.slices.fetch_add(1, Ordering::Relaxed) + 1;
+        self.watch.slices(done, self.slices_expected.load(Ordering::Relaxed).max(done));
+        self.add(pairs);
     }
 
     pub(crate) fn stopped(&self) -> bool {

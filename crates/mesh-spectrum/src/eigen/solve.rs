@@ -129,9 +129,7 @@ fn forward<A: Arithmetic, const HIGH: usize>(factor: &Packed, s: &Supernode, x: 
 #[inline(always)]
 fn backward<A: Arithmetic, const HIGH: usize>(factor: &Packed, s: &Supernode, x: &mut [Row]) {
     for (row, inverse) in x[s.begin..s.begin + s.width].iter_mut().zip(&factor.inverse[s.begin..]) {
-        for k in 0..WIDTH {
-            row[k] *= inverse;
-        }
+        row.iter_mut().for_each(|x| *x *= inverse);
     }
     for g in (0..s.width.div_ceil(WIDTH)).rev() {
         let columns = (s.width - WIDTH * g).min(WIDTH);
