@@ -133,9 +133,12 @@ pub(crate) fn chain(
         }
         low = found.eigenvalues.last().copied().unwrap_or(low);
         ahead = slice.ahead();
-        if !careful {
+        if careful {
+            drop(slice);
+        } else {
             handover = Some(slice.hand_over(HAND_OVER * half));
         }
+        symbolic.recycle(factor);
     }
     Err(Trouble::Again("more slices than foreseen".into()))
 }
@@ -175,7 +178,9 @@ fn place_shift(
             continue;
         };
         let nu = factor.below;
+        let good = factor.growth < GROWTH_MAX && factor.pivot_min > PIVOT_MIN * spacing;
         if nu <= below || (nu - below > 2 * half + 8 && !narrow) {
+            symbolic.recycle(factor);
             if best.is_some() {
                 break;
             }
@@ -192,9 +197,10 @@ fn place_shift(
             }
             continue;
         }
-        let good = factor.growth < GROWTH_MAX && factor.pivot_min > PIVOT_MIN * spacing;
         if best.as_ref().is_none_or(|best| factor.growth / factor.pivot_min < best.growth / best.pivot_min) {
-            best = Some(factor);
+            best.replace(factor).into_iter().for_each(|worse| symbolic.recycle(worse));
+        } else {
+            symbolic.recycle(factor);
         }
         usable += 1;
         if good || usable >= 4 {

@@ -114,12 +114,19 @@ impl Component {
     /// must be prepared.
     pub(crate) fn count_below(&self, shift: f64, progress: &Progress) -> Option<usize> {
         let shift = shift / self.unit;
-        self.factor(shift, progress).filter(|factor| factor.pivot_min > 1e-9 * shift).map(|factor| factor.below)
+        let factor = self.factor(shift, progress)?;
+        let below = (factor.pivot_min > 1e-9 * shift).then_some(factor.below);
+        self.recycle(factor);
+        below
     }
 
     /// Factors A − σI, both in `unit`.
     fn factor(&self, shift: f64, progress: &Progress) -> Option<Factor> {
         self.symbolic.as_ref().expect("prepared").factor(shift, progress)
+    }
+
+    fn recycle(&self, factor: Factor) {
+        self.symbolic.as_ref().expect("prepared").recycle(factor);
     }
 
     /// The null vector v = M^½ 1, normalised.
@@ -247,8 +254,12 @@ impl Component {
             let number = count as f64 * i as f64 / chains as f64 + 0.3 * attempt as f64;
             let mut at = weyl.inverse(number);
             for _ in 0..4 {
-                if let Some(factor) = self.factor(at, progress).filter(|factor| factor.growth < 1e6) {
-                    return Ok((at, factor.below));
+                if let Some(factor) = self.factor(at, progress) {
+                    let (below, growth) = (factor.below, factor.growth);
+                    self.recycle(factor);
+                    if growth < 1e6 {
+                        return Ok((at, below));
+                    }
                 }
                 at += 0.37 * top / count as f64;
             }

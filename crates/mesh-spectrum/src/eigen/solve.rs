@@ -4,6 +4,8 @@
 //! rows' entries of one column, so that every inner loop is "eight entries of L times a row of x" on whole cache
 //! lines, and the index of a row is read once for eight right-hand sides.
 
+use std::sync::Arc;
+
 use crate::eigen::block::{Block, Row, SMALL_ZERO, Small, WIDTH, ZERO};
 use crate::eigen::kernel::{Arithmetic, add_scaled, prefetch};
 
@@ -23,12 +25,19 @@ pub(crate) struct Supernode {
     pub(crate) groups: usize,
 }
 
-/// L, unit lower triangular, and D⁻¹, packed for [`solve_with`].
-pub(crate) struct Packed {
+/// Where the entries of L are, the same for every factor of one pattern.
+pub(crate) struct Layout {
     pub(crate) supernodes: Vec<Supernode>,
-    pub(crate) values: Block,
     /// Row numbers in groups of eight; the last group of a supernode is filled up with n, a row of its own in x.
     pub(crate) rows: Vec<u32>,
+    /// Rows of 64 bytes.
+    pub(crate) len: usize,
+}
+
+/// L, unit lower triangular, and D⁻¹, packed for [`solve_with`].
+pub(crate) struct Packed {
+    pub(crate) layout: Arc<Layout>,
+    pub(crate) values: Block,
     /// 1 / D.
     pub(crate) inverse: Vec<f64>,
 }
@@ -51,13 +60,13 @@ pub(crate) fn solve_with<A: Arithmetic, const R: usize, const HIGH: usize, const
     if let Some(scratch) = x.last_mut() {
         *scratch = ZERO;
     }
-    for supernode in &factor.supernodes {
+    for supernode in &factor.layout.supernodes {
         forward::<A, HIGH>(factor, supernode, x);
     }
     if let Some(scratch) = x.last_mut() {
         *scratch = ZERO;
     }
-    for (number, supernode) in factor.supernodes.iter().enumerate().rev() {
+    for (number, supernode) in factor.layout.supernodes.iter().enumerate().rev() {
         prefetch_backward(factor, number, x);
         backward::<A, HIGH>(factor, supernode, x);
     }
@@ -111,7 +120,7 @@ fn forward<A: Arithmetic, const HIGH: usize>(factor: &Packed, s: &Supernode, x: 
     }
     let first = s.begin + s.width;
     for g in 0..s.groups {
-        let rows = &factor.rows[s.rows + WIDTH * g..][..WIDTH];
+        let rows = &factor.layout.rows[s.rows + WIDTH * g..][..WIDTH];
         for &row in rows {
             prefetch(tail, row as usize - first);
         }
@@ -171,8 +180,8 @@ fn above<A: Arithmetic, const COLUMNS: usize>(
     for g in 0..s.groups {
         let start = s.below + g * s.stride + column;
         let l = &factor.values[start..start + COLUMNS];
-        let rows = &factor.rows[s.rows + WIDTH * g..][..WIDTH];
-        let later = &factor.rows[s.rows + WIDTH * (g + 4).min(s.groups - 1)..][..WIDTH];
+        let rows = &factor.layout.rows[s.rows + WIDTH * g..][..WIDTH];
+        let later = &factor.layout.rows[s.rows + WIDTH * (g + 4).min(s.groups - 1)..][..WIDTH];
         for r in 0..WIDTH {
             if r < COLUMNS {
                 prefetch(&factor.values, start + 4 * s.stride + r);
@@ -200,12 +209,12 @@ fn above<A: Arithmetic, const COLUMNS: usize>(
 #[inline(always)]
 fn prefetch_backward(factor: &Packed, number: usize, x: &[Row]) {
     let Some(far) = number.checked_sub(3) else { return };
-    let start = factor.supernodes[far].diagonal;
-    for line in start..factor.supernodes[far + 1].diagonal.min(start + 64) {
+    let start = factor.layout.supernodes[far].diagonal;
+    for line in start..factor.layout.supernodes[far + 1].diagonal.min(start + 64) {
         prefetch(&factor.values, line);
     }
-    let near = &factor.supernodes[number - 1];
-    for row in &factor.rows[near.rows..][..(WIDTH * near.groups).min(32)] {
+    let near = &factor.layout.supernodes[number - 1];
+    for row in &factor.layout.rows[near.rows..][..(WIDTH * near.groups).min(32)] {
         prefetch(x, *row as usize);
     }
 }
