@@ -4,7 +4,6 @@ mod zoo;
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::Instant;
 
 use mesh_spectrum::{
     EigenError, EigenOptions, Instructions, Mesh, OperatorOptions, Orthogonality, Seconds, Watch, eigenbasis, inspect,
@@ -51,11 +50,12 @@ impl Watch for Stopper {
 fn stopping_stops() {
     let built = build(rough(60, 50));
     for at in [1, 3, 40] {
-        let start = Instant::now();
         let stopper = Stopper { asked: AtomicUsize::new(0), at };
         let options = EigenOptions { count: 400, ..Default::default() };
         assert_eq!(eigenbasis(&built, &options, &stopper), Err(EigenError::Stopped));
-        assert!(start.elapsed().as_secs_f64() < 1.0, "a promise of the documentation, at 3 111 vertices");
+        // Once told, it does not go on: at most every thread asks again, at a few places.
+        let after = stopper.asked.load(Ordering::Relaxed) - at;
+        assert!(after <= 16 * rayon::current_num_threads(), "asked {after} times more");
     }
 }
 

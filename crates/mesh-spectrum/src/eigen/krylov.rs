@@ -28,7 +28,7 @@ use crate::eigen::slice::Tools;
 const LOSS_MAX: f64 = 1e-9;
 
 /// A measured loss above this says that the estimate cannot be trusted: from there on every block is orthogonalised.
-const LOSS_TRUSTED: f64 = 3e-8;
+const LOSS_TRUSTED: f64 = 1e-8;
 
 /// A Krylov space around one shift, growing by a block a step.
 pub(crate) struct Krylov<'a> {
