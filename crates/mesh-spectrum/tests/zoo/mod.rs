@@ -175,8 +175,8 @@ pub(crate) fn checked(operator: &Operator, options: &EigenOptions) -> Eigenbasis
     let phi: Vec<&[f64]> = basis.eigenvectors.chunks(n).collect();
     let weighted: Vec<Vec<f64>> = phi.iter().map(|phi| operator.vertex_mass_times(phi)).collect();
     for (i, a) in phi.iter().enumerate() {
-        for j in 0..=i {
-            let inner: f64 = a.iter().zip(&weighted[j]).map(|(a, b)| a * b).sum();
+        for (j, weighted) in weighted[..=i].iter().enumerate() {
+            let inner: f64 = a.iter().zip(weighted).map(|(a, b)| a * b).sum();
             let off = (inner - if i == j { 1.0 } else { 0.0 }).abs();
             assert!(off <= 1e-10, "φ{i} M φ{j} is off by {off:e}; 1e-10 is promised");
         }
