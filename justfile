@@ -92,6 +92,13 @@ fuzz seconds="300":
             -max_total_time={{ seconds }} -max_len=60000 -timeout=10 -rss_limit_mb=2048 || exit 1; \
     done
 
+# the eigenbasis beside SciPy + CHOLMOD, LaPy, SLEPc and dense `eigh`; needs libsuitesparse-dev, python3-slepc4py and python3-scipy (Debian)
+bench-eigen *options:
+    cargo build --release -p mesh-spectrum --example measure
+    test -x target/bench-eigen/venv/bin/python || python3 -m venv target/bench-eigen/venv
+    target/bench-eigen/venv/bin/pip install --quiet --requirement benches/eigen/requirements.txt
+    target/bench-eigen/venv/bin/python benches/eigen/run.py {{ options }}
+
 # fetch and bundle the report's JavaScript anew
 vendor:
     crates/crumple/src/report/page/vendor/make.sh

@@ -57,6 +57,8 @@ fn the_json_holds_what_is_promised() {
     if cfg!(target_os = "linux") {
         assert!(seen["peak_bytes"].as_u64().unwrap() > 1_000_000);
     }
+    assert!(seen["solver"]["peak_bytes_expected"].as_u64().unwrap() > 0);
+    assert!(seen["solver"]["thread_seconds"]["factor"].is_f64());
 
     let (header, data) = header(&file);
     let n = seen["vertices"].as_u64().unwrap();

@@ -71,4 +71,4 @@ pub mod transfer;
 mod vector;
 
 pub use error::Error;
-pub use mesh_spectrum::{EigenOptions, Kind, Mass, OperatorOptions, UnknownName, Watch};
+pub use mesh_spectrum::{Certificate, EigenOptions, Kind, Mass, OperatorOptions, UnknownName, Watch};

@@ -43,7 +43,10 @@ mod proximity;
 mod split;
 
 pub use coupling::{CouplingError, Tie};
-pub use eigen::{Certificate, EigenError, EigenOptions, Eigenbasis, InertiaCount, Method, Watch, eigenbasis};
+pub use eigen::{
+    Certificate, EigenError, EigenOptions, Eigenbasis, InertiaCount, Instructions, Method, Orthogonality, Seconds,
+    Watch, eigenbasis,
+};
 pub use inspect::{Inspection, Reason, inspect};
 pub use join::{Join, JoinError, join, ties_of};
 pub use mesh::{Mesh, MeshError};

@@ -6,12 +6,32 @@ use std::time::Instant;
 use clap::Args;
 use crumple::eigen::{self, Precision, Solved};
 use crumple::surface::Surface;
-use crumple::{EigenOptions, Error, Kind, OperatorOptions, Watch};
+use crumple::{Certificate, EigenOptions, Error, Kind, OperatorOptions, Watch};
 use serde_json::{Map, Value, json};
 
 use super::{Answer, init};
 use crate::options::OperatorArgs;
 use crate::output::Output;
+
+/// What the solver did and where its time went: seconds of all threads together.
+fn solver(certificate: &Certificate) -> Value {
+    let seconds = &certificate.seconds;
+    json!({
+        "factorisations": certificate.factorisations,
+        "solves": certificate.solves,
+        "peak_bytes_expected": certificate.peak_bytes,
+        "thread_seconds": {
+            "order": seconds.order,
+            "factor": seconds.factor,
+            "solve": seconds.solve,
+            "orthogonalise": seconds.orthogonalise,
+            "project": seconds.project,
+            "vectors": seconds.vectors,
+            "certify": seconds.certify,
+            "output": seconds.output,
+        },
+    })
+}
 
 #[derive(Args)]
 #[command(
@@ -82,6 +102,7 @@ impl Eigen {
         all["eigenvalues"] = json!(solved.basis.eigenvalues);
         all["seconds"] = Value::Object(seconds);
         all["peak_bytes"] = json!(eigen::peak_bytes());
+        all["solver"] = solver(&solved.basis.certificate);
         all["output"] = json!(self.output);
         output.print(&all, || words);
         Ok(Answer::Done)

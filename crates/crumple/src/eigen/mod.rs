@@ -2,7 +2,7 @@
 //!
 //! [`Surface`] → operator → eigenbasis → [`write()`]: `eigenvalues` `[K]` f64, `eigenvectors` `[K, N]` f64 (or f32), `mass` `[N]`
 //! f64, `points` `[N, 3]` f64, `triangles` `[T, 3]` u32, `vertex_ids` `[N]` u64, and with the consistent mass its matrix on
-//! vertices as `mass_indptr` [N + 1], `mass_indices`, `mass_data`, which is SciPy's `csr_matrix`.
+//! vertices as `mass_indptr` `[N + 1]`, `mass_indices`, `mass_data`, which is SciPy's `csr_matrix`.
 
 mod file;
 

@@ -5,9 +5,11 @@ use faer::{Accum, Mat, MatRef, Par};
 
 use super::Pairs;
 use super::pencil::{Pencil, times};
-use crate::eigen::basis::{Certificate, Eigenbasis, InertiaCount, Method, fix_sign, ranges};
+use crate::eigen::basis::{Certificate, Eigenbasis, InertiaCount, Method, ranges};
+use crate::eigen::output::fix_sign;
+use crate::eigen::seconds::{Seconds, Step};
 use crate::eigen::slice::{ROUNDING, Trouble, norm};
-use crate::eigen::{EigenError, Progress};
+use crate::eigen::{EigenError, EigenOptions, Progress};
 use crate::operator::Operator;
 
 /// Inner products above this are not made orthogonal but an error: the same eigenspace was taken twice. Below it the
@@ -16,16 +18,23 @@ const OVERLAP_MAX: f64 = 1e-2;
 
 /// Makes the vectors of a component B-orthonormal, the first the null vector in closed form. Eigenvalues stay the Ritz
 /// values, which are exact to rounding of 1/(λ − σ), where Rayleigh quotients would take up the upper end's noise.
-pub(super) fn orthonormalise(pencil: &Pencil, eigenvalues: &[f64], vectors: &mut Vec<f64>) -> Result<(), Trouble> {
+pub(super) fn orthonormalise(
+    pencil: &Pencil,
+    eigenvalues: &[f64],
+    vectors: &mut Vec<f64>,
+    progress: &Progress,
+) -> Result<(), Trouble> {
     let (n, count) = (pencil.rows(), eigenvalues.len());
     if count == 0 {
         return Ok(());
     }
     let mut x = MatRef::from_column_major_slice(&vectors[..], n, count).to_owned();
-    smooth(pencil, eigenvalues, &mut x);
+    progress.go_on()?;
+    progress.clock.time(Step::Vectors, || smooth(pencil, eigenvalues, &mut x));
     let null = pencil.null_vector();
     x.col_mut(0).iter_mut().zip(&null).for_each(|(x, null)| *x = *null);
     for round in 0..5 {
+        progress.go_on()?;
         let mut gram = Mat::<f64>::zeros(count, count);
         matmul(gram.as_mut(), Accum::Replace, x.transpose(), times(&pencil.b, &x).as_ref(), 1.0, Par::Seq);
         // Lengths first: what is left is then small off the diagonal.
@@ -119,13 +128,13 @@ pub(super) fn finish(
     operator: &Operator,
     pencils: &[Pencil],
     mut solved: Vec<Pairs>,
-    count: usize,
-    tolerance: f64,
+    (count, options): (usize, &EigenOptions),
     progress: &Progress,
 ) -> Result<Eigenbasis, EigenError> {
+    let tolerance = options.tolerance;
     for (pencil, pairs) in pencils.iter().zip(&mut solved).filter(|(_, pairs)| pairs.dense) {
         pairs.eigenvalues.iter_mut().enumerate().for_each(|(k, e)| *e = if k == 0 { 0.0 } else { e.max(0.0) });
-        let again = orthonormalise(pencil, &pairs.eigenvalues, &mut pairs.vectors);
+        let again = orthonormalise(pencil, &pairs.eigenvalues, &mut pairs.vectors, progress);
         again.map_err(|trouble| match trouble {
             Trouble::Fatal(error) => error,
             Trouble::Again(detail) => EigenError::NotConverged { found: 0, wanted: count, detail },
@@ -164,10 +173,8 @@ pub(super) fn finish(
     }
     let mut measured = (0.0f64, 0.0f64);
     for (pencil, pairs) in pencils.iter().zip(&solved) {
-        if progress.stopped() {
-            return Err(EigenError::Stopped);
-        }
-        let (residual, loss) = evidence(pencil, pairs)?;
+        progress.go_on()?;
+        let (residual, loss) = progress.clock.time(Step::Certify, || evidence(pencil, pairs))?;
         measured = (measured.0.max(residual), measured.1.max(loss));
     }
 
@@ -177,7 +184,7 @@ pub(super) fn finish(
     if residual.is_nan() || residual > tolerance.max(floor) {
         return Err(EigenError::Residual { residual, tolerance, floor });
     }
-    if loss.is_nan() || loss > 1e-10 {
+    if loss.is_nan() || loss > options.orthogonality.allowed() {
         return Err(EigenError::NotOrthogonal { loss });
     }
     let gap = 100.0 * tolerance * scale;
@@ -214,6 +221,10 @@ pub(super) fn finish(
             } else {
                 Method::Mixed
             },
+            factorisations: 0,
+            solves: 0,
+            peak_bytes: 0,
+            seconds: Seconds::default(),
         },
         eigenvalues,
         eigenvectors,

@@ -10,11 +10,12 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::pencil::{Factor, Pencil, times};
+use crate::eigen::seconds::{Clock, Step};
 use crate::eigen::slice::Trouble;
 use crate::eigen::{EigenError, Progress};
 
 /// Columns of a block.
-const WIDTH: usize = 8;
+pub(super) const WIDTH: usize = 8;
 
 /// Where pairs are wanted, and how many there are by inertia.
 #[derive(Debug, Clone, Copy)]
@@ -45,22 +46,22 @@ pub(super) fn solve(
     let from = low.max(0.0);
     let shift = 0.5 * (from + high);
     let factor = pencil
-        .factor_near(shift, (high - from) / pairs as f64)
+        .factor_near(shift, (high - from) / pairs as f64, &progress.clock)
         .ok_or_else(|| Trouble::Again(format!("no factorisation near {shift:e}")))?;
-    let mut krylov = Krylov::new(pencil, &factor, seed);
+    let mut krylov = Krylov::new(pencil, &factor, &progress.clock, seed);
     let mut next = 90 + 5 * pairs / 2;
     loop {
-        if progress.stopped() {
-            return Err(EigenError::Stopped.into());
-        }
+        progress.go_on()?;
         krylov.step()?;
         let dimension = krylov.dimension();
         let full = dimension + WIDTH > n;
         if dimension < next && !full {
             continue;
         }
-        let (values, s) =
-            krylov.ritz().ok_or_else(|| Trouble::Again("the projected problem did not converge".into()))?;
+        let (values, s) = progress
+            .clock
+            .time(Step::Project, || krylov.ritz())
+            .ok_or_else(|| Trouble::Again("the projected problem did not converge".into()))?;
         let good = |&k: &usize| {
             let (theta, beta) = (values[k].abs(), krylov.residual(&s, k));
             let inside = (low..high).contains(&(factor.shift + 1.0 / values[k]));
@@ -70,8 +71,9 @@ pub(super) fn solve(
         if chosen.len() == pairs {
             chosen.sort_by(|&a, &b| (1.0 / values[a]).total_cmp(&(1.0 / values[b])));
             let eigenvalues = chosen.iter().map(|&k| factor.shift + 1.0 / values[k]).collect();
-            progress.add(pairs);
-            return Ok((eigenvalues, krylov.vectors(&values, &s, &chosen)));
+            let vectors = progress.clock.time(Step::Vectors, || krylov.vectors(&values, &s, &chosen));
+            progress.slice(pairs);
+            return Ok((eigenvalues, vectors));
         }
         if full || dimension > 400 + 20 * pairs || chosen.len() > pairs {
             let found = chosen.len();
@@ -88,6 +90,7 @@ pub(super) fn solve(
 struct Krylov<'a> {
     pencil: &'a Pencil,
     factor: &'a Factor<'a>,
+    clock: &'a Clock,
     /// Q's blocks; the last is not in T yet.
     basis: Vec<Mat<f64>>,
     /// Columns of T: block j has the coefficients of Op Q_j on blocks 0 to j.
@@ -98,10 +101,10 @@ struct Krylov<'a> {
 }
 
 impl<'a> Krylov<'a> {
-    fn new(pencil: &'a Pencil, factor: &'a Factor<'a>, seed: u64) -> Krylov<'a> {
+    fn new(pencil: &'a Pencil, factor: &'a Factor<'a>, clock: &'a Clock, seed: u64) -> Krylov<'a> {
         let coupling = Mat::zeros(WIDTH, WIDTH);
         let random = ChaCha8Rng::seed_from_u64(seed);
-        let mut krylov = Krylov { pencil, factor, basis: Vec::new(), t: Vec::new(), coupling, random };
+        let mut krylov = Krylov { pencil, factor, clock, basis: Vec::new(), t: Vec::new(), coupling, random };
         let start = krylov.noise();
         let (q, _) = krylov.orthonormal(start);
         krylov.basis.push(q);
@@ -123,12 +126,12 @@ impl<'a> Krylov<'a> {
             Some(last) => times(&self.pencil.b, last),
             None => return Ok(()),
         };
-        if !self.factor.solve(w.as_mut()) {
+        if !self.clock.time(Step::Solve, || self.factor.solve(w.as_mut())) {
             return Err(EigenError::OutOfMemory { dofs: self.pencil.rows() }.into());
         }
-        let column = self.project_out(&mut w);
+        let clock = self.clock;
+        let (column, (q, r)) = clock.time(Step::Orthogonalise, || (self.project_out(&mut w), self.orthonormal(w)));
         self.t.push(column);
-        let (q, r) = self.orthonormal(w);
         self.basis.push(q);
         self.coupling = r;
         Ok(())

@@ -10,15 +10,14 @@ mod finish;
 mod krylov;
 mod pencil;
 
-use std::sync::atomic::AtomicUsize;
-
 use rayon::prelude::*;
 
 use crate::eigen::basis::Eigenbasis;
 use crate::eigen::component::{DENSE_SHARE, mix};
+use crate::eigen::seconds::Step;
 use crate::eigen::slice::Trouble;
 use crate::eigen::weyl::Weyl;
-use crate::eigen::{EigenError, EigenOptions, Progress, Watch, check};
+use crate::eigen::{EigenError, EigenOptions, Progress, Watch, check, memory};
 use crate::operator::{Csr, Operator};
 use pencil::Pencil;
 
@@ -46,23 +45,28 @@ pub(crate) fn eigenbasis(
     watch: &dyn Watch,
 ) -> Result<Eigenbasis, EigenError> {
     let count = check(options)?.min(operator.mass.len());
-    let progress = Progress { watch, done: AtomicUsize::new(0), total: count };
-    let mut pencils = Pencil::split(operator, mass)?;
+    let progress = Progress::new(watch, count);
+    let clock = &progress.clock;
+    let vertices = operator.vertex_mass.len();
+    // The result alone, before anything is built.
+    memory::check(count.saturating_mul(vertices).saturating_mul(8), options.memory_limit)?;
+    let mut pencils = clock.time(Step::Order, || Pencil::split(operator, mass))?;
     let area: f64 = operator.mass.iter().sum();
     let is_dense = |pencil: &Pencil| {
         let expected = 1.2 * pencil.area / area * count as f64 + 2.0;
         pencil.rows() <= options.dense_below.max(16) || expected > DENSE_SHARE * pencil.rows() as f64
     };
-    let mut solved: Vec<Option<Pairs>> = pencils
-        .par_iter_mut()
-        .map(|pencil| {
-            if is_dense(pencil) {
-                pencil.solve_dense(count.min(pencil.rows())).map(Some)
-            } else {
-                pencil.prepare().map(|()| None)
-            }
-        })
-        .collect::<Result<_, EigenError>>()?;
+    let dense: Vec<bool> = pencils.iter().map(is_dense).collect();
+    let sliced = pencils.par_iter_mut().zip(&dense).filter(|(_, dense)| !**dense);
+    sliced.try_for_each(|(pencil, _)| clock.time(Step::Order, || pencil.prepare()))?;
+    let expected = bytes_expected(&pencils, &dense, count, vertices);
+    memory::check(expected, options.memory_limit)?;
+    let solve_dense = |(pencil, dense): (&Pencil, &bool)| {
+        progress.go_on()?;
+        dense.then(|| clock.time(Step::Project, || pencil.solve_dense(count.min(pencil.rows())))).transpose()
+    };
+    let mut solved: Vec<Option<Pairs>> =
+        pencils.par_iter().zip(&dense).map(solve_dense).collect::<Result<_, EigenError>>()?;
     let (top, below) = top(&pencils, &solved, count, &progress)?;
     let tolerance = options.tolerance.min(1e-8);
     let solved: Vec<Pairs> = pencils
@@ -80,7 +84,30 @@ pub(crate) fn eigenbasis(
             None => in_intervals(pencil, top, below, tolerance, mix(options.seed, number as u64), &progress),
         })
         .collect::<Result<_, EigenError>>()?;
-    finish::finish(operator, &pencils, solved, count, options.tolerance, &progress)
+    let mut basis = finish::finish(operator, &pencils, solved, (count, options), &progress)?;
+    basis.certificate.seconds = clock.seconds();
+    basis.certificate.factorisations = clock.times(Step::Factor);
+    basis.certificate.solves = krylov::WIDTH * clock.times(Step::Solve);
+    basis.certificate.peak_bytes = expected;
+    Ok(basis)
+}
+
+/// Bytes of everything at its largest, with the result.
+fn bytes_expected(pencils: &[Pencil], dense: &[bool], count: usize, vertices: usize) -> usize {
+    let area: f64 = pencils.iter().map(|pencil| pencil.area).sum();
+    let (mut kept, mut working) = (0, Vec::new());
+    for (pencil, dense) in pencils.iter().zip(dense) {
+        let n = pencil.rows();
+        let pairs = ((pencil.area / area * count as f64) as usize + 2).min(n);
+        // The pairs, and while they are made orthonormal, their products with A and B and what they become.
+        kept += pencil.bytes() + 8 * n * 4 * pairs;
+        let space = 90 + 7 * PAIRS / 2; // columns that an interval needs, with its pairs
+        let one = if *dense { 48 * n * n } else { pencil.factor_bytes() + 8 * n * space.min(2 * n) };
+        working.extend((0..if *dense { 1 } else { pairs.div_ceil(PAIRS) }).map(|_| one));
+    }
+    // As many at a time as there are threads, the largest of them.
+    working.sort_unstable_by(|a, b| b.cmp(a));
+    kept + working.iter().take(rayon::current_num_threads()).sum::<usize>().max(8 * count * vertices)
 }
 
 /// A value with at least count + 1 eigenvalues of all components below it, not many more, and how many of each.
@@ -103,17 +130,16 @@ fn top(
     let area: f64 = pencils.iter().map(|pencil| pencil.area).sum();
     let (mut low, mut high) = (0.0, 2.0 * pencils.iter().map(Pencil::norm).fold(0.0, f64::max));
     let mut at = Weyl::closed(area).inverse(wanted as f64).min(0.5 * high);
+    let clock = &progress.clock;
     let counts = |at: f64| -> Option<Vec<usize>> {
         let below = |(pencil, solved): (&Pencil, &Option<Pairs>)| match solved {
             Some(pairs) => Some(pairs.eigenvalues.iter().filter(|&&e| e < at).count()),
-            None => pencil.factor(at).filter(|factor| factor.pivot_min > 1e-9 * at).map(|factor| factor.below),
+            None => pencil.factor(at, clock).filter(|factor| factor.pivot_min > 1e-9 * at).map(|factor| factor.below),
         };
         pencils.par_iter().zip(solved).map(below).collect()
     };
     for round in 0..200 {
-        if progress.stopped() {
-            return Err(EigenError::Stopped);
-        }
+        progress.go_on()?;
         let Some(below) = counts(at) else {
             at *= 1.0 + 1e-5; // on an eigenvalue, to rounding
             continue;
@@ -175,10 +201,11 @@ fn in_intervals(
                 let interval = krylov::Interval { low: ends[0].0, high: ends[1].0, pairs: ends[1].1 - ends[0].1, top };
                 krylov::solve(pencil, interval, tolerance, mix(seed, 100 * attempt as u64 + k as u64), progress)
             };
+            progress.expect_slices(borders.len() - 1);
             let parts: Vec<_> = borders.par_windows(2).enumerate().map(solve).collect::<Result<Vec<_>, Trouble>>()?;
             let (eigenvalues, vectors): (Vec<Vec<f64>>, Vec<Vec<f64>>) = parts.into_iter().unzip();
             let (mut eigenvalues, mut vectors) = (eigenvalues.concat(), vectors.concat());
-            finish::orthonormalise(pencil, &eigenvalues, &mut vectors)?;
+            finish::orthonormalise(pencil, &eigenvalues, &mut vectors, progress)?;
             let found = |shift: f64| eigenvalues.iter().filter(|&&eigenvalue| eigenvalue < shift).count();
             let counts: Vec<_> = borders[1..].iter().map(|&(at, below)| (at, found(at), below)).collect();
             if let Some((at, found, counted)) = counts.iter().find(|(_, found, counted)| found != counted) {
@@ -207,10 +234,8 @@ fn intervals(
     let wanted = count.div_ceil(PAIRS) + attempt;
     let guesses: Vec<f64> = (1..wanted).map(|k| weyl.inverse((k * count) as f64 / wanted as f64)).collect();
     let at = |shift: f64| -> Result<Option<(f64, usize)>, Trouble> {
-        if progress.stopped() {
-            return Err(EigenError::Stopped.into());
-        }
-        Ok(in_a_gap(|at| pencil.factor(at).map(|factor| factor.below), shift, GAP * top, top))
+        progress.go_on()?;
+        Ok(in_a_gap(|at| pencil.factor(at, &progress.clock).map(|factor| factor.below), shift, GAP * top, top))
     };
     let mut borders = vec![(f64::NEG_INFINITY, 0), (top, count)];
     borders.extend(guesses.into_par_iter().map(at).collect::<Result<Vec<_>, _>>()?.into_iter().flatten());

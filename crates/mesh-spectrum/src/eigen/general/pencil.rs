@@ -13,6 +13,7 @@ use faer::{Conj, Mat, MatMut, Par, Side};
 
 use super::Pairs;
 use crate::eigen::EigenError;
+use crate::eigen::seconds::{Clock, Step};
 use crate::eigen::weyl::Weyl;
 use crate::operator::{Csr, Operator};
 
@@ -134,10 +135,24 @@ impl Pencil {
     }
 
     /// Factors A − σB; `None` if a pivot is exactly zero or the result is not finite, or memory is short.
-    pub(super) fn factor(&self, shift: f64) -> Option<Factor<'_>> {
+    pub(super) fn factor(&self, shift: f64, clock: &Clock) -> Option<Factor<'_>> {
         let symbolic = self.symbolic.as_ref()?;
-        let values: Vec<f64> = symbolic.a.iter().zip(&symbolic.b).map(|(a, b)| a - shift * b).collect();
-        symbolic.factor(&values, shift)
+        clock.time(Step::Factor, || {
+            let values: Vec<f64> = symbolic.a.iter().zip(&symbolic.b).map(|(a, b)| a - shift * b).collect();
+            symbolic.factor(&values, shift)
+        })
+    }
+
+    /// Bytes of the matrices and of what was prepared for the factors.
+    pub(super) fn bytes(&self) -> usize {
+        let matrices = 12 * (self.a.columns.len() + self.b.columns.len()) + 40 * self.rows();
+        matrices
+            + self.symbolic.as_ref().map_or(0, |symbolic| 24 * symbolic.rows.len() + 4 * symbolic.cholesky.len_val())
+    }
+
+    /// Bytes of one factorisation.
+    pub(super) fn factor_bytes(&self) -> usize {
+        self.symbolic.as_ref().map_or(0, |symbolic| 8 * symbolic.cholesky.len_val() + 8 * symbolic.rows.len())
     }
 
     /// Factors B.
@@ -147,11 +162,11 @@ impl Pencil {
     }
 
     /// Factors at a shift near the one given: moved up by 0.37 spacings while the factor is of poor quality.
-    pub(super) fn factor_near(&self, shift: f64, spacing: f64) -> Option<Factor<'_>> {
+    pub(super) fn factor_near(&self, shift: f64, spacing: f64, clock: &Clock) -> Option<Factor<'_>> {
         let quality = |factor: &Factor| factor.growth / factor.pivot_min;
         let mut best: Option<Factor> = None;
         for nudge in 0..4 {
-            let Some(factor) = self.factor(shift + 0.37 * spacing * f64::from(nudge)) else { continue };
+            let Some(factor) = self.factor(shift + 0.37 * spacing * f64::from(nudge), clock) else { continue };
             let good = factor.growth < GROWTH_MAX && factor.pivot_min > PIVOT_MIN * spacing;
             if best.as_ref().is_none_or(|best| quality(&factor) < quality(best)) {
                 best = Some(factor);
