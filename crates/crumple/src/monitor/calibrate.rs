@@ -87,7 +87,7 @@ pub fn calibrate(
     };
     let stopped_at = |track: &Track, rule: Rule| {
         let mut monitor = Monitor::new(target.clone(), rule);
-        let places = track.places().iter().take_while(|place| place.at <= target.end());
+        let places = track.places().iter().take_while(|place| place.at <= target.reach());
         let mut steps = places.map(|place| monitor.step(place.at, &place.numbers));
         steps.find(|step| step.verdict == Verdict::Diverged).map(|step| step.at / target.end())
     };
@@ -108,7 +108,7 @@ pub fn calibrate(
 /// A run's similarity to the target at each of the target's states that it has reached.
 fn similarities(target: &Track, run: &Track) -> Vec<Option<f64>> {
     let at = |place: &super::Place| {
-        let reached = place.at <= run.end() * (1.0 + 1e-5);
+        let reached = place.at <= run.reach();
         run.at(place.at).filter(|_| reached).map(|own| cosine(&place.numbers, &own.numbers))
     };
     target.places().iter().map(at).collect()
