@@ -41,7 +41,7 @@ example:
     cargo run --release -- analyze examples/hat-section/runs --params examples/hat-section/inputs.csv --join 2.5 -o {{ study }}
     test -s {{ study }}/report.html
 
-# the tables of docs/experiment.md and docs/joining.md
+# the tables of docs/experiment.md
 experiment:
     cargo build --release
     rm -rf target/plain target/joined
@@ -49,6 +49,17 @@ experiment:
     target/release/crumple analyze examples/hat-section/runs --join 2.5 -o target/joined
     target/release/crumple compare target/plain --labels examples/hat-section/labels.csv
     target/release/crumple compare target/joined --labels examples/hat-section/labels.csv
+
+# the tables of docs/joining.md: sheets apart, joined by distance, by the deck's welds, and with their nodes merged
+joining:
+    cargo build --release
+    rm -rf target/joining
+    python3 benches/joining.py target/release/crumple target/joining
+
+# the tables of docs/rotation-spectrum.md; without ../shared those of the fine bundle are left out
+rotation:
+    cargo build --release -p crumple-cli -p structures
+    python3 benches/rotation_spectrum --write docs/rotation-spectrum.md
 
 # licences, forbidden crates and sources of Cargo.lock; without network
 deny:
@@ -62,6 +73,31 @@ advisories:
 bench-analyze bundle="examples/hat-section/runs" repeats="3":
     cargo build --release
     python3 benches/side_by_side.py {{ bundle }} --repeats {{ repeats }} --scratch target/side-by-side
+
+# our reader beside plain reads and lasso-python on a family of 400 MB, and opening 1,000 files
+bench-read repeats="3":
+    cargo build --release -p d3plot --example read_speed
+    python3 benches/read_peers.py target/release/examples/read_speed --scratch target/bench-read --repeats {{ repeats }}
+
+# the table of docs/reading.md: every test family read by us, lasso-python, VTK and dynars (the last: pip install dynars)
+read-table:
+    cargo build --release
+    python3 benches/read_table.py target/release/crumple crates/d3plot/testdata ../shared/data/d3plot
+
+# fuzz the reader, `seconds` for each target; needs a nightly toolchain and cargo-fuzz
+fuzz seconds="300":
+    for target in family header geometry state; do \
+        mkdir -p target/fuzz-corpus/$target && \
+        cargo +nightly fuzz run --fuzz-dir fuzz -s none $target target/fuzz-corpus/$target fuzz/corpus/$target -- \
+            -max_total_time={{ seconds }} -max_len=60000 -timeout=10 -rss_limit_mb=2048 || exit 1; \
+    done
+
+# the eigenbasis beside SciPy + CHOLMOD, LaPy, SLEPc and dense `eigh`; needs libsuitesparse-dev, python3-slepc4py and python3-scipy (Debian)
+bench-eigen *options:
+    cargo build --release -p mesh-spectrum --example measure
+    test -x target/bench-eigen/venv/bin/python || python3 -m venv target/bench-eigen/venv
+    target/bench-eigen/venv/bin/pip install --quiet --requirement benches/eigen/requirements.txt
+    target/bench-eigen/venv/bin/python benches/eigen/run.py {{ options }}
 
 # fetch and bundle the report's JavaScript anew
 vendor:

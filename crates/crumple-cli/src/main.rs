@@ -44,7 +44,7 @@ fn main() -> ExitCode {
         let _ = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global();
     }
     let output = Output { json: cli.json, quiet: cli.quiet };
-    let watch = progress::Terminal::new(cli.quiet || cli.json);
+    let watch = progress::Terminal::new(cli.quiet);
     let outcome = cli.command.run(&output, &watch);
     watch.finish();
     match outcome {

@@ -1,16 +1,44 @@
 //! Options that several commands share, and what they mean to the library. Defaults live there, not here.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use clap::Args;
 use crumple::Error;
 use crumple::basis::BasisOptions;
+use crumple::deck;
 use crumple::descriptor::{self, DescribeOptions, Descriptor, Select, Set};
 use crumple::field::Field;
 use crumple::inputs::Table;
-use crumple::modes::ModesOptions;
+use crumple::joints::Join;
+use crumple::modes::{Along, ModesOptions, States};
+use crumple::run::Run;
 use crumple::similarity::SimilarityOptions;
 use crumple::study::{Function, Loaded, Rows};
+use crumple::{Kind, Mass, UnknownName};
+
+/// The operator.
+#[derive(Args)]
+pub(crate) struct OperatorArgs {
+    /// Discretisation of the Laplacian: cotan, tufted (any faces, no negative weights; for meshes that are non-manifold
+    /// or badly shaped) or polygon (quads without choosing a diagonal) [default: cotan]
+    #[arg(long, value_name = "OPERATOR")]
+    operator: Option<String>,
+    /// Mass matrix: lumped (a third of each triangle's area to each corner), consistent (not diagonal; slower) or
+    /// identity (every vertex the same, as the paper's formula has it) [default: lumped]
+    #[arg(long, value_name = "MASS")]
+    mass: Option<String>,
+}
+
+impl OperatorArgs {
+    pub(crate) fn kinds(&self) -> Result<(Kind, Mass), Error> {
+        let wrong =
+            |name| move |error: UnknownName| Error::Value { name, value: error.name, expected: error.expected.into() };
+        let kind = self.operator.as_deref().map(str::parse).transpose().map_err(wrong("--operator"))?;
+        let mass = self.mass.as_deref().map(str::parse).transpose().map_err(wrong("--mass"))?;
+        Ok((kind.unwrap_or_default(), mass.unwrap_or_default()))
+    }
+}
 
 /// The surface and its eigenbasis.
 #[derive(Args)]
@@ -18,14 +46,21 @@ pub(crate) struct BasisArgs {
     /// Part whose shells make the surface, by id or title; may be given several times [default: all shells]
     #[arg(long = "part", value_name = "PART")]
     pub(crate) parts: Vec<String>,
+    #[command(flatten)]
+    operator: OperatorArgs,
     /// Quantity of the result files to project beside the shape: plastic_strain, temperature, velocity, acceleration;
     /// plastic_strain:outer (max, min, mean, inner, outer) for one layer of shells; may be given several times
     #[arg(long = "field", value_name = "FIELD")]
     fields: Vec<String>,
-    /// Treat separate sheets as one: mutually nearest vertices of different pieces of the mesh that are closer than this
-    /// (length unit of the model) share one degree of freedom. `init` recommends a distance where sheets lie close
-    #[arg(long, value_name = "DISTANCE", allow_negative_numbers = true)]
-    join: Option<f64>,
+    /// Treat separate sheets as one. A distance: mutually nearest vertices of different pieces of the mesh that are closer
+    /// (length unit of the model) share one degree of freedom; `init` recommends one where sheets lie close. `deck`: what
+    /// the deck's spot welds, rigid bodies and tied contacts hold moves together
+    #[arg(long, value_name = "DISTANCE|deck", allow_negative_numbers = true)]
+    join: Option<String>,
+    /// Keyword deck (.k, .key, .dyn) of the model: titles of parts, and the welds and ties that `--join deck` needs
+    /// [default: the reference itself where it is a deck; for a study the deck it was made with]
+    #[arg(long, value_name = "FILE")]
+    deck: Option<PathBuf>,
     /// Eigenpairs K of the basis, 1 or more; each costs time and space, and resolves finer folds [default: 500]
     #[arg(short = 'K', long, value_name = "K", allow_negative_numbers = true)]
     eigenpairs: Option<usize>,
@@ -39,9 +74,27 @@ impl BasisArgs {
         Ok(fields)
     }
 
-    pub(crate) fn options(&self) -> BasisOptions {
+    pub(crate) fn options(&self) -> Result<BasisOptions, Error> {
         let default = BasisOptions::default();
-        BasisOptions { eigenpairs: self.eigenpairs.unwrap_or(default.eigenpairs), join: self.join }
+        let join = match self.join.as_deref() {
+            None => None,
+            Some("deck") => Some(Join::DECK),
+            Some(text) => Some(Join::Distance(text.parse().map_err(|_| Error::Value {
+                name: "--join",
+                value: text.to_owned(),
+                expected: "a distance in the model's length unit, or the word deck".into(),
+            })?)),
+        };
+        let (kind, mass) = self.operator.kinds()?;
+        Ok(BasisOptions { eigenpairs: self.eigenpairs.unwrap_or(default.eigenpairs), join, kind, mass })
+    }
+
+    /// The reference run with its deck: the one given, or `known` (a study's own).
+    pub(crate) fn with_deck(&self, run: Run, known: Option<&Path>) -> Result<Run, Error> {
+        match self.deck.as_deref().or(known.filter(|_| run.deck().is_none())) {
+            Some(path) => Ok(run.with_deck(Arc::new(deck::read(path)?))),
+            None => Ok(run),
+        }
     }
 }
 
@@ -68,32 +121,90 @@ impl AddArgs {
 /// Grouping into modes.
 #[derive(Args)]
 pub(crate) struct ModesArgs {
-    /// Number of modes, 1 or more [default: the number from 2 to 8 with the best mean silhouette]
+    /// Number of modes, 1 or more [default: the best of 2 to 8, see --choose; hdbscan finds its own]
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     count: Option<usize>,
-    /// Seed of the random starts; the same seed gives the same modes [default: 1]
+    /// What decides between numbers of modes: the mean `silhouette`, or the `stability` of the groups when runs are left out;
+    /// both are shown [default: silhouette]
+    #[arg(long, value_name = "EVIDENCE")]
+    choose: Option<String>,
+    /// Seed of the random starts and samples; the same seed gives the same modes [default: 1]
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     seed: Option<u64>,
-    /// What makes runs alike: `rotation`, the kind and direction of the deformation wherever it happens, or
-    /// `displacement`, where every place ends up, as in the paper [default: rotation]
+    /// What makes runs alike: `rotation`, the kind and direction of the deformation wherever it happens, `displacement`,
+    /// where every place ends up, as in the paper (also: `paper`), `coordinates`, which have the distances of the
+    /// displacement, or a field that the study keeps [default: rotation]
     #[arg(long, value_name = "WHAT")]
     by: Option<String>,
-    /// How to group: kmeans, ward or average [default: kmeans]
+    /// How to group: kmeans, ward, average, mixture (of Gaussians), or hdbscan, which leaves runs in no dense group without a
+    /// mode [default: kmeans]
     #[arg(long, value_name = "METHOD")]
     method: Option<String>,
+    /// Fewest runs of a mode, with --method hdbscan [default: a quarter of the runs, 2 to 5]
+    #[arg(long, value_name = "RUNS", allow_negative_numbers = true)]
+    smallest: Option<usize>,
+    /// Which states of each run are grouped: the `last`, or the whole `series`, see --align [default: last]
+    #[arg(long, value_name = "WHICH")]
+    states: Option<String>,
+    /// Group by the states at this time instead of the last, interpolated; may be given several times
+    #[arg(long = "at", value_name = "TIME", allow_negative_numbers = true, conflicts_with_all = ["states", "at_intrusion"])]
+    at: Vec<f64>,
+    /// Group by the states at this share of the RMS displacement that all runs reach; may be given several times
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true, conflicts_with = "states")]
+    at_intrusion: Vec<f64>,
+    /// What whole series are aligned by: `time` or `intrusion`, the RMS displacement [default: time]
+    #[arg(long, value_name = "ALONG")]
+    align: Option<String>,
 }
 
 impl ModesArgs {
+    /// Whether anything was asked for.
+    pub(crate) fn asked(&self) -> bool {
+        let Self { count, choose, seed, by, method, smallest, states, at, at_intrusion, align } = self;
+        count.is_some()
+            || seed.is_some()
+            || smallest.is_some()
+            || [choose, by, method, states, align].iter().any(|option| option.is_some())
+            || !at.is_empty()
+            || !at_intrusion.is_empty()
+    }
+
     pub(crate) fn options(&self) -> Result<ModesOptions, Error> {
         let default = ModesOptions::default();
+        let choose = self.choose.as_deref().map(str::parse).transpose()?;
         let method = self.method.as_deref().map(str::parse).transpose()?;
-        let by = self.by.as_deref().map(str::parse).transpose()?.unwrap_or(default.by);
+        let by = self.by.as_deref().map(str::parse).transpose()?;
         Ok(ModesOptions {
             count: self.count,
+            choose: choose.unwrap_or(default.choose),
             seed: self.seed.unwrap_or(default.seed),
             method: method.unwrap_or(default.method),
-            by,
+            smallest: self.smallest,
+            by: by.unwrap_or(default.by),
+            states: self.states()?,
         })
+    }
+
+    fn states(&self) -> Result<States, Error> {
+        let align: Option<Along> = self.align.as_deref().map(str::parse).transpose()?;
+        if !self.at.is_empty() {
+            return Ok(States::At { along: Along::Time, stations: self.at.clone() });
+        }
+        if !self.at_intrusion.is_empty() {
+            return Ok(States::At { along: Along::Intrusion, stations: self.at_intrusion.clone() });
+        }
+        match (self.states.as_deref(), align) {
+            (None | Some("last"), None) => Ok(States::Last),
+            (Some("series"), align) => Ok(States::Series { along: align.unwrap_or_default() }),
+            (Some("last") | None, Some(_)) => Err(Error::Value {
+                name: "--align",
+                value: self.align.clone().unwrap_or_default(),
+                expected: "--states series beside it; last states are not aligned".into(),
+            }),
+            (Some(other), _) => {
+                Err(Error::Value { name: "--states", value: other.into(), expected: "last or series".into() })
+            }
+        }
     }
 }
 
@@ -162,7 +273,7 @@ fn functions(text: &str) -> Result<Vec<Function>, Error> {
 pub(crate) struct SimilarityArgs {
     /// Which of the descriptor's numbers: `rotation`, the spectrum of the rotation field, which finds a deformation
     /// wherever on the part it happens, or `paper`, coefficients on the eigenvectors that matter [default: what the
-    /// descriptor was made for]
+    /// descriptor was made for; paper with --metric euclidean and --weight frequency]
     #[arg(long, value_name = "KIND")]
     kind: Option<String>,
     /// Compare only the coefficients of these eigenvectors, as 3,5,8-12, in place of the descriptor's own (kind paper)

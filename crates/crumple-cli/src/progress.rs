@@ -49,7 +49,7 @@ impl Watch for Terminal {
                 old.finish_and_clear();
             }
             let fresh = ProgressBar::new(total as u64);
-            if let Ok(style) = ProgressStyle::with_template("{prefix:>24} {wide_bar} {pos}/{len}, {eta} left") {
+            if let Ok(style) = ProgressStyle::with_template("{prefix:>24} {wide_bar} {pos}/{len}{msg}, {eta} left") {
                 fresh.set_style(style);
             }
             fresh.set_prefix(stage);
@@ -58,6 +58,15 @@ impl Watch for Terminal {
         if let Some((_, bar)) = bar.as_ref() {
             bar.set_length(total as u64);
             bar.set_position(done as u64);
+        }
+    }
+
+    fn slices(&self, done: usize, expected: usize) {
+        // Eigenpairs come a slice at a time, so their bar moves in steps: this says how many steps there are.
+        if let Ok(bar) = self.bar.lock()
+            && let Some((_, bar)) = bar.as_ref()
+        {
+            bar.set_message(format!(", slice {done} of {expected}"));
         }
     }
 

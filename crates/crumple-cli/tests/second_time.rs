@@ -49,15 +49,66 @@ fn descriptors_of_modes_that_are_gone_go_with_them() {
     let now = medoids(&crumple!["modes", &study, "--count", "5", "--by", "displacement", "--json"].done().json());
     assert_ne!(before, now);
     for mode in &before {
+        // What the name meant before is gone: a mode of that name now is described anew, by its own medoid.
         let search = crumple!["search", &study, &mode.0, "--json"];
-        if now.contains(mode) {
-            search.done();
-        } else {
-            search.refused(&["no descriptor", &mode.0]).hints("--mode");
+        match now.iter().find(|(name, _)| *name == mode.0) {
+            Some((_, medoid)) => assert_eq!(search.done().json()["results"][0]["run"], **medoid),
+            None => drop(search.refused(&["no descriptor", &mode.0]).hints("--mode")),
         }
     }
     // What the user has named himself stays.
     crumple!["search", &study, "mine"].done();
+}
+
+#[test]
+fn a_mode_keeps_the_name_it_was_given_and_its_descriptor() {
+    let place = folder();
+    let study = own_study(place.path());
+    crumple!["modes", &study, "--count", "3"].done();
+    let mode = |told: &serde_json::Value, name: &str| -> serde_json::Value {
+        let modes = rows(&told["modes"]);
+        modes.iter().find(|mode| mode["name"] == name).unwrap_or_else(|| panic!("no {name}: {told}")).clone()
+    };
+    crumple!["describe", &study, "--mode", "mode-1"].done();
+    let before = crumple!["search", &study, "mode-1", "--json"].done().json();
+    let named = crumple!["modes", &study, "--name", "mode-1=crush", "--json"].done().json();
+    assert_eq!(named["count"], 3, "the modes that are there are named, not found anew");
+    let after = crumple!["search", &study, "crush", "--json"].done().json();
+    assert_eq!(before["results"], after["results"]);
+    crumple!["search", &study, "mode-1"].refused(&["no descriptor 'mode-1'"]);
+    crumple!["describe", &study, "--mode", "crush"].done();
+    // The next call keeps it with its runs; the page and the list know it.
+    let again = crumple!["modes", &study, "--count", "3", "--method", "ward", "--json"].done().json();
+    let (was, is) = (mode(&named, "crush"), mode(&again, "crush"));
+    let shared = texts(&was["members"]).iter().filter(|run| texts(&is["members"]).contains(run)).count();
+    assert!(2 * shared > rows(&was["members"]).len() && 2 * shared > rows(&is["members"]).len());
+    assert!(crumple!["info", &study].done().stdout.contains("crush"));
+    let page = place.path().join("page.html");
+    crumple!["report", &study, "-o", &page].done();
+    assert!(std::fs::read_to_string(&page).unwrap().contains("\"name\":\"crush\""));
+    // Where no mode is it now, that is said.
+    let one = crumple!["modes", &study, "--count", "1"].done();
+    assert!(one.stderr.contains("no mode is 'crush' now"), "{}", one.stderr);
+}
+
+#[test]
+fn runs_without_a_mode_go_through_everything() {
+    let place = folder();
+    let study = own_study(place.path());
+    // No two groups of six of a dozen runs: no modes at all.
+    let told = crumple!["modes", &study, "--method", "hdbscan", "--smallest", "12", "--json"].done().json();
+    assert_eq!((rows(&told["modes"]).len(), rows(&told["without_mode"]).len()), (0, 12));
+    for method in ["hdbscan", "mixture"] {
+        let words = crumple!["modes", &study, "--method", method].done().stdout;
+        assert!(words.contains("stability") && words.contains("silhouette"), "{words}");
+        crumple!["report", &study, "-o", place.path().join("page.html")].done();
+        crumple!["export", &study, "-o", place.path().join(method), "--format", "csv"].done();
+        crumple!["compare", &study].done();
+        crumple!["info", &study].done();
+    }
+    let series = crumple!["modes", &study, "--states", "series", "--align", "intrusion"].done();
+    assert!(series.stderr.contains("which all reach"), "{}", series.stderr);
+    crumple!["modes", &study, "--at-intrusion", "0.5", "--at-intrusion", "1"].done();
 }
 
 #[test]

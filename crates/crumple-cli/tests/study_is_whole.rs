@@ -444,7 +444,7 @@ fn check_names_what_is_damaged() {
 
 #[test]
 fn a_damaged_manifest_is_named() {
-    for content in ["", "{", "[]", "{}", r#"{"layout": 1}"#, "\u{fffd}\0\0"] {
+    for content in ["", "{", "[]", "{}", r#"{"layout": 2}"#, "\u{fffd}\0\0"] {
         let own = Own::new();
         std::fs::write(own.study().join("manifest.json"), content).unwrap();
         let checkup = crumple!["check", own.study(), "--json"].ends_with_code(1).json();

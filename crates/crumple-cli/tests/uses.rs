@@ -11,7 +11,7 @@ use world::{DOZEN, Own, STATES, STRANGER, dozen, example, example_run, finish, n
 
 /// The runs of the dozen by likeness to a run, itself first.
 fn by_likeness(study: &Path, run: &str) -> Vec<(String, f64)> {
-    let found = crumple!["search", study, run, "-n", "12", "--json"].done().json();
+    let found = crumple!["search", study, run, "--top", "12", "--json"].done().json();
     let hit = |hit: &serde_json::Value| (hit["run"].as_str().unwrap().to_owned(), number(&hit["distance"]));
     rows(&found["results"]).iter().map(hit).collect()
 }
@@ -19,10 +19,13 @@ fn by_likeness(study: &Path, run: &str) -> Vec<(String, f64)> {
 /// Copies a run of the example as its solver would write it: root, then states in pieces, slowly.
 fn write_slowly(run: &str, to: &Path) {
     std::fs::create_dir_all(to).unwrap();
-    for name in ["d3plot", "d3plot01"] {
+    let mut files: Vec<PathBuf> =
+        std::fs::read_dir(example_run(run)).unwrap().map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+    for from in files {
         use std::io::Write;
-        let bytes = std::fs::read(example_run(run).join(name)).unwrap();
-        let mut file = std::fs::File::create(to.join(name)).unwrap();
+        let bytes = std::fs::read(&from).unwrap();
+        let mut file = std::fs::File::create(to.join(from.file_name().unwrap())).unwrap();
         for piece in bytes.chunks(10_007) {
             file.write_all(piece).unwrap();
             std::thread::sleep(Duration::from_millis(15));

@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use crate::Error;
+use crate::deck;
 use crate::error::io;
 
 /// A result file that was found, with the id it will have in a study.
@@ -65,6 +66,10 @@ pub fn find(paths: &[PathBuf]) -> Result<Vec<Found>, Error> {
 /// A file that is given by name.
 fn by_name(path: &Path) -> Result<Found, Error> {
     let absolute = path.canonicalize().map_err(io("read", path))?;
+    if deck::is_deck(path) {
+        let name = absolute.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        return Ok(Found { id: name, path: path.to_owned(), fault: None });
+    }
     let folder = absolute.parent().unwrap_or(Path::new("/"));
     let roots = d3plot::roots(folder)?;
     if !roots.families.iter().any(|root| root.path.file_name() == absolute.file_name()) {

@@ -23,6 +23,8 @@ use crate::target::{self, Named};
 pub struct Comparison {
     /// One row a query, choice of coefficients and method.
     pub rows: Vec<Row>,
+    /// The rotation spectrum on each query.
+    pub rotation: Vec<Row>,
     /// Agreement of modes with labels; empty without labels.
     pub modes: Vec<ModesAgreement>,
     /// How labels were joined to runs, and what was left over.
@@ -70,6 +72,8 @@ pub struct ModesAgreement {
     pub count: usize,
     /// Whether the program chose that number.
     pub chosen: bool,
+    /// Runs without a mode: they are left out of the index.
+    pub without: usize,
     /// Mean silhouette.
     pub silhouette: f64,
     /// Adjusted Rand index over the runs whose label has clear runs.
@@ -93,16 +97,16 @@ pub fn compare(loaded: &Loaded, labels: Option<&Table>, threshold: Threshold) ->
     };
     let arena = |select| Arena::new(loaded, rows, &judge, select, threshold);
     let arenas = [(Select::Coordinates, arena(Select::Coordinates)?), (Select::Difference, arena(Select::Difference)?)];
-    let mut result = Vec::new();
+    let (mut result, mut rotation) = (Vec::new(), Vec::new());
     for query in &judge.queries {
         for (select, arena) in &arenas {
             result.extend(judge_query(loaded, arena, query, *select, threshold)?);
         }
         let turned = &arenas[0].1;
-        result.push(turned.row(query, Method::Rotation, ROTATION.0, ROTATION.1, turned.spectra[0].len(), None));
+        rotation.push(turned.row(query, Method::Rotation, ROTATION.0, ROTATION.1, turned.spectra[0].len(), None));
     }
     let modes = if labels.is_some() { agreements(loaded, rows, &judge)? } else { Vec::new() };
-    Ok(Comparison { rows: result, modes, notes })
+    Ok(Comparison { rows: result, rotation, modes, notes })
 }
 
 /// Labels by row, and which rows are asked about.
@@ -140,7 +144,7 @@ impl Judge {
             let word = |column| cell(row, column).to_ascii_lowercase();
             clear.is_none_or(|column| matches!(word(column).as_str(), "true" | "1" | "yes"))
         };
-        let distances = Points::by_displacement(rows, loaded.basis.facts.area).distances();
+        let distances = Points::by_displacement(rows, loaded.basis.total_mass()).distances();
         let queries = names.iter().enumerate().filter_map(|(index, name)| {
             let members = |run: &usize| label_of_row[*run] == Some(index);
             let clear: Vec<usize> =
@@ -339,16 +343,20 @@ pub fn average_precision(right: &[bool]) -> f64 {
 fn agreements(loaded: &Loaded, rows: &Coefficients, judge: &Judge) -> Result<Vec<ModesAgreement>, Error> {
     let asked = judge.queries.len();
     let mut result = Vec::new();
-    let methods = [modes::Method::KMeans, modes::Method::Ward, modes::Method::Average];
-    let ways = [By::Rotation, By::Displacement].into_iter().flat_map(|by| methods.map(|method| (by, method)));
+    let ways =
+        [By::Rotation, By::Displacement].into_iter().flat_map(|by| modes::Method::ALL.map(|method| (by, method)));
     for (by, method) in ways {
         for count in [Some(asked), None] {
-            if asked < 2 || asked > rows.rows() {
+            if asked < 2 || asked > rows.rows() || count.is_some() && !method.takes_count() {
                 continue;
             }
             let found = modes::modes(&loaded.study, &ModesOptions { count, method, by, ..Default::default() }, &())?;
+            // Runs that HDBSCAN leaves out agree with nothing and are counted apart.
             let mode_of = |run: &str| {
-                found.modes.iter().position(|mode| mode.members.iter().any(|member| member == run)).unwrap_or(0)
+                found
+                    .modes
+                    .iter()
+                    .position(|mode| mode.members.binary_search_by(|member| member.as_str().cmp(run)).is_ok())
             };
             let index = |keep: &dyn Fn(usize) -> bool| {
                 let pairs: (Vec<usize>, Vec<usize>) = judge
@@ -356,17 +364,19 @@ fn agreements(loaded: &Loaded, rows: &Coefficients, judge: &Judge) -> Result<Vec
                     .iter()
                     .enumerate()
                     .filter_map(|(row, label)| {
-                        label.filter(|&label| keep(label)).map(|label| (mode_of(&rows.runs[row]), label))
+                        label.filter(|&label| keep(label)).and_then(|label| Some((mode_of(&rows.runs[row])?, label)))
                     })
                     .unzip();
                 adjusted_rand_index(&pairs.0, &pairs.1)
             };
-            let silhouette = found.runs.iter().map(|run| run.silhouette).sum::<f64>() / found.runs.len() as f64;
+            let with_mode: Vec<f64> = found.runs.iter().filter_map(|run| run.silhouette).collect();
+            let silhouette = with_mode.iter().sum::<f64>() / with_mode.len().max(1) as f64;
             let queried = |label: usize| judge.queries.iter().any(|query| query.index == label);
             result.push(ModesAgreement {
                 by,
                 method,
                 count: found.modes.len(),
+                without: found.without_mode().len(),
                 chosen: count.is_none(),
                 silhouette,
                 ari: index(&queried),

@@ -12,6 +12,23 @@ pub enum Error {
     /// A result file could not be read.
     #[error("{0}")]
     Read(#[from] d3plot::Error),
+    /// A keyword deck could not be read.
+    #[error("{0}")]
+    Deck(#[from] keyword_deck::Error),
+    /// Joining by a deck was asked for, and there is none.
+    #[error("--join deck: {run} is no keyword deck, and none was given")]
+    NoDeck {
+        /// The reference run.
+        run: String,
+    },
+    /// A deck of another model than the surface.
+    #[error("{}: the deck does not belong to this surface: {what}", deck.display())]
+    OtherDeck {
+        /// The deck.
+        deck: PathBuf,
+        /// What differs.
+        what: String,
+    },
     /// A file whose name says that it is a run and whose content does not.
     #[error("{what}")]
     Refused {
@@ -153,6 +170,17 @@ pub enum Error {
         /// The reference run.
         run: String,
         /// What is wrong with it.
+        source: mesh_spectrum::MeshError,
+    },
+    /// A mesh file that cannot be read.
+    #[error("{0}")]
+    MeshFile(mesh_files::Error),
+    /// A mesh file that holds no usable mesh.
+    #[error("{}: {source}", path.display())]
+    BadMesh {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with the mesh.
         source: mesh_spectrum::MeshError,
     },
     /// Joining the components failed.
@@ -379,6 +407,9 @@ impl Error {
     pub fn remedy(&self) -> Option<String> {
         let text = match self {
             Self::Read(error) => return error.remedy(),
+            Self::Deck(error) => return error.remedy().map(str::to_owned),
+            Self::NoDeck { .. } => "give the deck with --deck FILE, or join by --join DISTANCE",
+            Self::OtherDeck { .. } => "give the deck that the runs were made from; ids of nodes must be the same",
             Self::Refused { remedy, .. } => return remedy.clone(),
             Self::NoSuchPath(_) => "check the spelling; a run is the root file of a family or its folder",
             Self::NoRuns { .. } => "give the folder that holds the runs, or a run's root file (d3plot)",
@@ -402,6 +433,11 @@ impl Error {
                 "the run may not have started, or may have been cut short; copy it again, or leave it out with `add --skip-bad`"
             }
             Self::Mesh { .. } => "choose another reference run, or parts without the fault, with --part",
+            Self::MeshFile(mesh_files::Error::Io { .. }) => return None,
+            Self::MeshFile(mesh_files::Error::Unknown { .. }) => {
+                "give the file the ending of its format; a result file is a d3plot root file or its folder"
+            }
+            Self::MeshFile(_) | Self::BadMesh { .. } => "write it again with the program that made it",
             Self::Join(_) => "give a distance in the model's length unit, a little above the gap between the sheets",
             Self::Operator(_) => "choose other parts with --part, or mend the mesh",
             Self::Eigen(_) => "ask for fewer eigenpairs (-K), or report this mesh",
@@ -449,6 +485,15 @@ impl Error {
 /// Wraps the system's answer with what was tried and where.
 pub(crate) fn io<'a>(action: &'static str, path: &'a Path) -> impl FnOnce(std::io::Error) -> Error + 'a {
     move |source| Error::Io { action, path: path.to_owned(), source }
+}
+
+impl From<mesh_spectrum::OperatorError> for Error {
+    fn from(error: mesh_spectrum::OperatorError) -> Self {
+        match error {
+            mesh_spectrum::OperatorError::Join(error) => Self::Join(error),
+            other => Self::Operator(other),
+        }
+    }
 }
 
 impl From<mesh_spectrum::EigenError> for Error {

@@ -8,7 +8,7 @@
 use crate::Error;
 use crate::basis::Basis;
 use crate::descriptor::{Descriptor, Selected};
-use crate::rotation::Ruler;
+use crate::rotation::{OCTAVES, Ruler};
 use crate::select::{Kind, Select};
 use crate::study::{Coefficients, Function, Need, Rows, Stored, Study, column_name, triples};
 
@@ -25,6 +25,8 @@ enum Block {
     Values { offset: Vec<f64>, scale: f64, frequencies: Vec<f64> },
     /// The rotation spectrum.
     Spectrum(Ruler),
+    /// Its kind alone.
+    Kind(Ruler),
 }
 
 impl Features {
@@ -35,16 +37,19 @@ impl Features {
     pub fn of(basis: &Basis, descriptor: &Descriptor, kind: Kind) -> Result<Self, Error> {
         match kind {
             Kind::Rotation => {
-                let (features, found) = (Self::rotation(basis), descriptor.spectrum.direction.len());
-                let expected = Ruler::of(basis).directions();
-                if found == expected {
-                    return Ok(features);
+                let (mut features, ruler) = (Self::rotation(basis), Ruler::of(basis));
+                let (found, expected) = (descriptor.spectrum.direction.len(), ruler.directions());
+                if found == 0 {
+                    // A descriptor of another part: its direction means nothing here.
+                    features.blocks = vec![Block::Kind(ruler)];
+                } else if found != expected {
+                    return Err(Error::Value {
+                        name: "descriptor",
+                        value: format!("a direction of {found} triples"),
+                        expected: format!("{expected} in this study"),
+                    });
                 }
-                Err(Error::Value {
-                    name: "descriptor",
-                    value: format!("a direction of {found} triples"),
-                    expected: format!("{expected} in this study"),
-                })
+                Ok(features)
             }
             Kind::Paper => {
                 let blocks: Vec<Block> =
@@ -63,6 +68,16 @@ impl Features {
         Self {
             needs: vec![Need { function: Function::Rotation, eigenvectors: None }],
             blocks: vec![Block::Spectrum(Ruler::of(basis))],
+        }
+    }
+
+    /// All coefficients of the displacement.
+    pub fn displacement(basis: &Basis) -> Self {
+        let all = 3 * basis.eigenpairs();
+        let frequencies = basis.eigenvalues.iter().flat_map(|eigenvalue| [eigenvalue.max(0.0).sqrt(); 3]).collect();
+        Self {
+            needs: vec![Need { function: Function::Displacement, eigenvectors: None }],
+            blocks: vec![Block::Values { offset: vec![0.0; all], scale: 1.0, frequencies }],
         }
     }
 
@@ -87,6 +102,7 @@ impl Features {
                 stored.values.iter().zip(offset).map(|(&x, offset)| (f64::from(x) + offset) * scale).collect()
             }
             Block::Spectrum(ruler) => ruler.spectrum(&triples(stored.values), stored.rms).numbers(),
+            Block::Kind(ruler) => ruler.spectrum(&triples(stored.values), stored.rms).kind,
         };
         self.blocks.iter().zip(stored).flat_map(numbers).collect::<Vec<f64>>()
     }
@@ -94,7 +110,7 @@ impl Features {
     /// The numbers of a descriptor's target.
     pub fn target(&self, descriptor: &Descriptor) -> Vec<f64> {
         match self.blocks.first() {
-            Some(Block::Spectrum(_)) => descriptor.spectrum.numbers(),
+            Some(Block::Spectrum(_) | Block::Kind(_)) => descriptor.spectrum.numbers(),
             _ => descriptor
                 .blocks()
                 .flat_map(|selected| selected.values.iter().flatten().map(move |x| x * selected.scale))
@@ -105,15 +121,18 @@ impl Features {
     /// Names of the numbers, stable: the names of the study's columns, or `kind_1` …, `turn_1_x` ….
     pub fn names(&self) -> Vec<String> {
         let of = |(block, need): (&Block, &Need)| match block {
-            Block::Values { .. } => {
+            Block::Values { offset, .. } => {
                 let components = need.function.components();
-                let eigenvectors = need.eigenvectors.iter().flatten();
+                let all = || (1..=offset.len() / components).collect();
+                let eigenvectors: Vec<usize> = need.eigenvectors.clone().unwrap_or_else(all);
                 eigenvectors
-                    .flat_map(|&j| (0..components).map(move |c| (j, c)))
+                    .into_iter()
+                    .flat_map(|j| (0..components).map(move |c| (j, c)))
                     .map(|(j, c)| column_name(need.function, j, c))
                     .collect()
             }
             Block::Spectrum(ruler) => ruler.names(),
+            Block::Kind(ruler) => ruler.names()[..OCTAVES].to_vec(),
         };
         self.blocks.iter().zip(&self.needs).flat_map(of).collect::<Vec<String>>()
     }
@@ -122,7 +141,7 @@ impl Features {
     pub(crate) fn frequencies(&self) -> Option<Vec<f64>> {
         let of = |block: &Block| match block {
             Block::Values { frequencies, .. } => Some(frequencies.clone()),
-            Block::Spectrum(_) => None,
+            Block::Spectrum(_) | Block::Kind(_) => None,
         };
         Some(self.blocks.iter().map(of).collect::<Option<Vec<_>>>()?.concat())
     }

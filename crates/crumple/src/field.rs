@@ -23,6 +23,12 @@ pub struct Field {
 pub enum Quantity {
     /// Effective plastic strain of shells.
     PlasticStrain,
+    /// Von Mises stress of shells.
+    VonMises,
+    /// Thickness of shells.
+    Thickness,
+    /// Internal energy density of shells.
+    InternalEnergy,
     /// Temperature of nodes.
     Temperature,
     /// Velocity of nodes, a vector.
@@ -47,8 +53,11 @@ pub enum Layer {
     Outer,
 }
 
-const QUANTITIES: [(&str, Quantity); 4] = [
+const QUANTITIES: [(&str, Quantity); 7] = [
     ("plastic_strain", Quantity::PlasticStrain),
+    ("von_mises", Quantity::VonMises),
+    ("thickness", Quantity::Thickness),
+    ("internal_energy", Quantity::InternalEnergy),
     ("temperature", Quantity::Temperature),
     ("velocity", Quantity::Velocity),
     ("acceleration", Quantity::Acceleration),

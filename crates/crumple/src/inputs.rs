@@ -4,7 +4,7 @@
 //! a key that is a number joins by the number in the run's folder name, where every name has exactly one number and
 //! no two names share it.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 
 use crate::Error;
@@ -146,6 +146,27 @@ impl Table {
             return None;
         }
         Some(numbers.iter().map(|number| by_number.get(number).copied()).collect())
+    }
+
+    /// The cell of a column for each of the runs that has one, by run id.
+    ///
+    /// # Errors
+    /// [`Error::Table`] without such a column, [`Error::NoMatch`] where no row belongs to a run.
+    pub fn values_of<'a>(
+        &self,
+        column: &str,
+        runs: impl Iterator<Item = &'a str>,
+    ) -> Result<BTreeMap<String, String>, Error> {
+        let runs: Vec<&str> = runs.collect();
+        let joined = self.join(&runs)?;
+        let at = self
+            .columns
+            .iter()
+            .position(|name| name == column)
+            .ok_or_else(|| Error::Table { path: self.path.clone(), what: format!("no column '{column}'") })?;
+        let cell = |row: usize| self.rows[row].1.get(at).filter(|cell| !cell.is_empty()).cloned();
+        let with_cell = |(run, row): (&&str, Option<usize>)| Some(((*run).to_owned(), cell(row?)?));
+        Ok(runs.iter().zip(joined.row_of_run).filter_map(with_cell).collect())
     }
 }
 

@@ -14,7 +14,7 @@ use crate::Error;
 use crate::basis::{Basis, coefficients_of};
 use crate::field::Field;
 use crate::reference::{Placement, Reference};
-use crate::rotation;
+use crate::rotation::{self, Rest};
 use crate::run::Run;
 use crate::vector::{Vector, area, distance, square, subtract};
 
@@ -84,13 +84,14 @@ impl ProjectedState {
 /// Numbers about one state that need the whole shape.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Measures {
-    /// M-weighted root mean square displacement, in the length unit.
+    /// Root mean square displacement over the surface (each vertex by its area), in the length unit.
     pub rms: f64,
     /// Largest displacement of a vertex, in the length unit.
     pub max: f64,
     /// Share of ‖p − p⁰‖²_M that the K coefficients catch (Parseval), 0 to 1; 1 for a state without displacement.
     pub captured: f64,
-    /// Share of ‖p − p⁰‖²_M that the best rigid motion explains, 0 to 1; 0 for a state without displacement.
+    /// Share of the mean square displacement over the surface that the best rigid motion explains, 0 to 1; 0 for a state
+    /// without displacement.
     pub rigid_share: f64,
     /// Median of |edge strain|: how far the surface is from isometric.
     pub strain_median: f64,
@@ -100,13 +101,17 @@ pub struct Measures {
     pub area_median: f64,
     /// 95 % quantile of the same.
     pub area_p95: f64,
-    /// Root mean square of sin θ of the rotation field over the surface: how much the surface turned, 0 to 1.
+    /// Root mean square of sin θ of the rotation field in M, as its coefficients are (with the lumped mass: over the
+    /// surface): how much the surface turned, 0 to 1.
     pub turn: f64,
 }
 
+/// A measure: its column's name, and how it is taken.
+type Column = (&'static str, fn(&Measures) -> f64);
+
 impl Measures {
-    /// Every measure by its column's name.
-    pub(crate) const COLUMNS: [(&str, fn(&Self) -> f64); 9] = [
+    /// Every measure.
+    pub(crate) const COLUMNS: [Column; 9] = [
         ("rms", |m| m.rms),
         ("max", |m| m.max),
         ("captured", |m| m.captured),
@@ -118,6 +123,9 @@ impl Measures {
         ("turn", |m| m.turn),
     ];
 }
+
+/// A sharp fold or two lie within this share of the edges; a surface that is torn or inside out does not.
+const TURNED_OVER_MAX: f64 = 0.05;
 
 /// States are projected in batches of at most this many bytes of shapes, displacements and rotations.
 const BATCH_BYTES: usize = 256 << 20;
@@ -142,6 +150,7 @@ pub struct Projector<'a> {
     basis: &'a Basis,
     fields: &'a [Field],
     geometry: Geometry<'a>,
+    rest: Rest<'a>,
     /// Where the last run's nodes and shells were: the next run of a bundle mostly has the same mesh.
     placed: Mutex<Option<(blake3::Hash, Arc<Placement>)>>,
 }
@@ -149,7 +158,8 @@ pub struct Projector<'a> {
 impl<'a> Projector<'a> {
     /// Prepares what all runs share. `fields`: projected beside displacement and rotation.
     pub fn new(reference: &'a Reference, basis: &'a Basis, fields: &'a [Field]) -> Self {
-        Self { reference, basis, fields, geometry: Geometry::of(reference, basis), placed: Mutex::default() }
+        let rest = Rest::of(reference.mesh.triangles(), reference.mesh.vertices());
+        Self { reference, basis, fields, geometry: Geometry::of(reference, basis), rest, placed: Mutex::default() }
     }
 
     /// Projects every whole state of a run. Memory is bounded whatever the number of states.
@@ -181,6 +191,7 @@ impl<'a> Projector<'a> {
         }
         if let Some(last) = states.last() {
             warnings.extend(last.measures.warnings());
+            warnings.extend(self.surface_warnings(run, &placement, states.len() - 1, &last.measures)?);
         }
         Ok(Projected {
             run: run.id().to_owned(),
@@ -189,6 +200,43 @@ impl<'a> Projector<'a> {
             warnings,
             spent,
         })
+    }
+
+    /// What happened to the surface that a rotation field of it cannot tell, in words.
+    fn surface_warnings(
+        &self,
+        run: &Run,
+        placement: &Placement,
+        state: usize,
+        measures: &Measures,
+    ) -> Result<Vec<String>, Error> {
+        let mut warnings = Vec::new();
+        let shape = self.reference.shape(run, placement, state)?;
+        let deleted = run.deleted_shells(state)?.map_or(0, |deleted| {
+            let mut shells = placement.shell_of_triangle.clone();
+            shells.dedup();
+            shells.iter().filter(|&&shell| deleted.get(shell as usize) == Some(&true)).count()
+        });
+        if deleted > 0 {
+            warnings.push(format!("{deleted} shells of the surface are deleted in the last state; they count by where their nodes are, which may fly apart"));
+        }
+        let health = self.rest.health(&shape);
+        if health.without_area > 0 {
+            warnings.push(format!(
+                "{} faces have lost their area in the last state; they have no rotation and are left out of it",
+                health.without_area
+            ));
+        }
+        if health.turned_over > TURNED_OVER_MAX {
+            warnings.push(format!(
+                "{:.0} % of the edges are folded over by more than 150 degrees in the last state: the surface is torn or turned inside out there, and its rotation means little",
+                100.0 * health.turned_over
+            ));
+        }
+        if measures.turn < rotation::TURN_MIN && measures.rms > 0.0 {
+            warnings.push("it moved, but did not deform: its surface turned as a whole or not at all".into());
+        }
+        Ok(warnings)
     }
 
     /// Projects one state of a run that may still be growing.
@@ -231,15 +279,9 @@ impl<'a> Projector<'a> {
         let mut measures: Vec<Measures> =
             (0..shapes.len()).map(|at| geometry.measures(&shapes[at], &displacements[at], &deltas[at])).collect();
         clock.lap(&mut spent.displacement);
-        let turned: Vec<Vec<Vector>> = shapes
-            .iter()
-            .map(|shape| rotation::field(reference.mesh.triangles(), reference.mesh.vertices(), shape))
-            .collect();
+        let turned: Vec<Vec<Vector>> = shapes.iter().map(|shape| self.rest.field(shape)).collect();
         let rotations = coefficients_of(basis, &turned);
-        measures
-            .iter_mut()
-            .zip(&turned)
-            .for_each(|(measures, turned)| measures.turn = geometry.mean_square(turned).sqrt());
+        measures.iter_mut().zip(&turned).for_each(|(measures, turned)| measures.turn = geometry.turn(turned));
         clock.lap(&mut spent.rotation);
         let quantities: Vec<Vec<Vec<Vector>>> =
             quantities.iter().map(|values| coefficients_of(basis, values)).collect();
@@ -307,7 +349,7 @@ impl Measures {
         let mut warnings = Vec::new();
         if self.rigid_share > 0.5 {
             warnings.push(format!(
-                "{:.0} % of the displacement is a rigid motion of the whole part; similarities then speak of where it went more than of how it deformed",
+                "{:.0} % of the displacement is a rigid motion of the whole part; the paper's similarities then speak of where it went more than of how it deformed",
                 100.0 * self.rigid_share
             ));
         }
@@ -327,9 +369,12 @@ struct Geometry<'a> {
     triangles: &'a [[u32; 3]],
     /// Areas of the triangles, T.
     areas: Vec<f64>,
-    mass: &'a [f64],
+    /// For M-products.
+    basis: &'a Basis,
+    /// Area of each vertex, N.
+    shares: &'a [f64],
     area: f64,
-    /// Σ m |p⁰ − centre|²: the size of the part.
+    /// Σ a |p⁰ − centre|²: the size of the part.
     spread: f64,
     edges: Vec<(u32, u32, f64)>,
     edge_mean: f64,
@@ -350,32 +395,32 @@ impl<'a> Geometry<'a> {
         let length = |a: u32, b: u32| distance(undeformed[a as usize], undeformed[b as usize]);
         let edges: Vec<_> = ends.into_iter().map(|(a, b)| (a, b, length(a, b))).filter(|edge| edge.2 > 0.0).collect();
         let edge_mean = edges.iter().map(|edge| edge.2).sum::<f64>() / edges.len().max(1) as f64;
-        let mass = &basis.mass[..];
         let triangles = reference.mesh.triangles();
         let areas = triangles.iter().map(|corners| area(corners.map(|vertex| undeformed[vertex as usize]))).collect();
-        let mut geometry =
-            Self { undeformed, triangles, areas, mass, area: mass.iter().sum(), spread: 0.0, edges, edge_mean };
+        let (shares, area) = (&basis.area[..], basis.area.iter().sum());
+        let mut geometry = Self { undeformed, triangles, areas, basis, shares, area, spread: 0.0, edges, edge_mean };
         let centre = geometry.centre(undeformed);
-        geometry.spread = undeformed.iter().zip(mass).map(|(p, m)| m * square(subtract(*p, centre))).sum();
+        geometry.spread = undeformed.iter().zip(shares).map(|(p, share)| share * square(subtract(*p, centre))).sum();
         geometry
     }
 
     /// Centre of mass of a shape.
     fn centre(&self, shape: &[[f64; 3]]) -> [f64; 3] {
-        std::array::from_fn(|c| shape.iter().zip(self.mass).map(|(p, m)| m * p[c]).sum::<f64>() / self.area)
+        std::array::from_fn(|c| shape.iter().zip(self.shares).map(|(p, share)| share * p[c]).sum::<f64>() / self.area)
     }
 
     fn displacement(&self, shape: &[[f64; 3]]) -> Vec<[f64; 3]> {
         shape.iter().zip(self.undeformed).map(|(p, q)| subtract(*p, *q)).collect()
     }
 
-    /// Mean over the surface of |f|².
-    fn mean_square(&self, values: &[Vector]) -> f64 {
-        values.iter().zip(self.mass).map(|(f, m)| m * square(*f)).sum::<f64>() / self.area
+    /// Root mean square of a rotation field in M, so that `turn`² ‖1‖²_M is the energy that its coefficients share.
+    fn turn(&self, rotation: &[Vector]) -> f64 {
+        (self.basis.square_norm(rotation) / self.basis.total_mass()).sqrt()
     }
 
     fn measures(&self, shape: &[[f64; 3]], displacement: &[[f64; 3]], delta: &[[f64; 3]]) -> Measures {
-        let norm2 = self.mean_square(displacement) * self.area;
+        let norm2: f64 = displacement.iter().zip(self.shares).map(|(d, share)| share * square(*d)).sum();
+        let energy = self.basis.square_norm(displacement);
         let max = displacement.iter().map(|d| square(*d)).fold(0.0, f64::max).sqrt();
         let caught: f64 = delta.iter().map(|d| square(*d)).sum();
         let strain =
@@ -389,7 +434,7 @@ impl<'a> Geometry<'a> {
         Measures {
             rms: (norm2 / self.area).sqrt(),
             max,
-            captured: if norm2 > 0.0 { (caught / norm2).min(1.0) } else { 1.0 },
+            captured: if energy > 0.0 { (caught / energy).min(1.0) } else { 1.0 },
             // Of a displacement that is tiny against the part the difference of two large sums says nothing.
             rigid_share: if norm2 > 1e-12 * self.spread {
                 (1.0 - self.rigid_rest(shape) / norm2).clamp(0.0, 1.0)
@@ -405,13 +450,13 @@ impl<'a> Geometry<'a> {
         }
     }
 
-    /// min over rigid motions of ‖p − (R p⁰ + t)‖²_M: Horn 1987, the rotation from the largest eigenvector of a 4 × 4
-    /// matrix. With centred shapes the minimum is Σ m (|p|² + |p⁰|²) − 2 λ_max.
+    /// min over rigid motions of Σ a |p − (R p⁰ + t)|²: Horn 1987, the rotation from the largest eigenvector of a 4 × 4
+    /// matrix. With centred shapes the minimum is Σ a (|p|² + |p⁰|²) − 2 λ_max.
     fn rigid_rest(&self, shape: &[[f64; 3]]) -> f64 {
         let (p0, q0) = (self.centre(self.undeformed), self.centre(shape));
         let mut s = [[0.0; 3]; 3];
         let mut spread = 0.0;
-        for ((p, q), m) in self.undeformed.iter().zip(shape).zip(self.mass) {
+        for ((p, q), m) in self.undeformed.iter().zip(shape).zip(self.shares) {
             let (p, q) = (subtract(*p, p0), subtract(*q, q0));
             for i in 0..3 {
                 for j in 0..3 {

@@ -51,9 +51,9 @@ pub fn displaced(reference: &Reference, displacement: &[[f64; 3]]) -> Vec<[f64; 
 /// Compares a reconstruction with the original, both N × 3.
 pub fn errors(reference: &Reference, basis: &Basis, original: &[[f64; 3]], reconstruction: &[[f64; 3]]) -> Errors {
     let square = |a: &[f64; 3], b: &[f64; 3]| square(subtract(*a, *b));
-    let area: f64 = basis.mass.iter().sum();
+    let area: f64 = basis.area.iter().sum();
     let rms = |a: &[[f64; 3]], b: &[[f64; 3]]| {
-        let sum: f64 = a.iter().zip(b).zip(&basis.mass).map(|((a, b), mass)| mass * square(a, b)).sum();
+        let sum: f64 = a.iter().zip(b).zip(&basis.area).map(|((a, b), share)| share * square(a, b)).sum();
         (sum / area).sqrt()
     };
     let displacement = rms(original, reference.mesh.vertices());
@@ -65,9 +65,9 @@ pub fn errors(reference: &Reference, basis: &Basis, original: &[[f64; 3]], recon
 /// The same for a field, both N × 3, in the field's unit; `relative` is over the field's own root mean square.
 pub fn field_errors(basis: &Basis, original: &[[f64; 3]], reconstruction: &[[f64; 3]]) -> Errors {
     let difference: Vec<_> = original.iter().zip(reconstruction).map(|(a, b)| subtract(*a, *b)).collect();
-    let area: f64 = basis.mass.iter().sum();
+    let area: f64 = basis.area.iter().sum();
     let rms = |values: &[[f64; 3]]| {
-        (values.iter().zip(&basis.mass).map(|(x, mass)| mass * square(*x)).sum::<f64>() / area).sqrt()
+        (values.iter().zip(&basis.area).map(|(x, share)| share * square(*x)).sum::<f64>() / area).sqrt()
     };
     let (own, error) = (rms(original), rms(&difference));
     let max = difference.iter().map(|x| square(*x)).fold(0.0, f64::max).sqrt();

@@ -38,7 +38,7 @@ pub struct Placement {
 }
 
 /// A face by the user ids of its nodes, in rising order: the same face in any run, whatever the order of its corners.
-type FaceKey = [u64; 4];
+pub(crate) type FaceKey = [u64; 4];
 
 impl Reference {
     /// Takes the shells of the named parts (ids or titles; all shells when none is named) of a run.
@@ -176,6 +176,17 @@ impl Reference {
         sums
     }
 
+    /// The triangles of each face, by its node ids.
+    pub(crate) fn triangles_of_face(&self) -> HashMap<FaceKey, Vec<u32>> {
+        let mut triangles: HashMap<FaceKey, Vec<u32>> = HashMap::new();
+        let mut next = 0;
+        for (key, count) in self.face_keys() {
+            triangles.entry(key).or_default().extend(next..next + count as u32);
+            next += count as u32;
+        }
+        triangles
+    }
+
     /// The input faces in order, each by its node ids, with the number of its triangles; a quad is put together again
     /// from its two.
     fn face_keys(&self) -> Vec<(FaceKey, usize)> {
@@ -243,7 +254,7 @@ fn used_nodes(nodes: usize, faces: &[[u32; 4]]) -> (Vec<u32>, Vec<u32>) {
 }
 
 /// Distinct ids in rising order, the last one repeated where there are fewer than four.
-fn face_key(ids: [u64; 4]) -> FaceKey {
+pub(crate) fn face_key(ids: [u64; 4]) -> FaceKey {
     let mut key = ids;
     key.sort_unstable();
     let mut distinct: Vec<u64> = key.to_vec();

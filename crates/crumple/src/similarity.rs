@@ -20,7 +20,8 @@ use crate::target::Target;
 /// What is compared, and how.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SimilarityOptions {
-    /// Which numbers are compared. Default: the descriptor's own kind.
+    /// Which numbers are compared. Default: the descriptor's own kind, or the paper's where a weight or measure is asked
+    /// for that only its coefficients have.
     pub kind: Option<Kind>,
     /// Subtract the mean of the last states of all runs first. Default: no, as in the paper.
     pub centred: bool,
@@ -28,6 +29,15 @@ pub struct SimilarityOptions {
     pub weight: Weight,
     /// The measure. Default: cosine, the paper's.
     pub metric: Metric,
+}
+
+impl SimilarityOptions {
+    /// Which of a descriptor's numbers are compared.
+    pub fn kind_for(&self, descriptor: &Descriptor) -> Kind {
+        // An eigenvalue of its own, and a length.
+        let only_paper = self.weight == Weight::Frequency || self.metric == Metric::Euclidean;
+        self.kind.unwrap_or(if only_paper { Kind::Paper } else { descriptor.kind })
+    }
 }
 
 /// Weights of the coefficients before they are compared.
@@ -89,7 +99,7 @@ pub struct Comparer {
     /// The target after all that.
     target: Vec<f64>,
     metric: Metric,
-    /// Turns features into root mean square lengths: 1 / √area for coefficients.
+    /// Turns features into root mean square lengths: 1 / √(total mass), which is the area but for the identity as mass, for coefficients.
     to_length: f64,
     /// Inverse of the shrunk covariance.
     precision: Option<Mat<f64>>,
@@ -102,9 +112,9 @@ impl Comparer {
     /// [`Error::TooFewRuns`] where the options need the study's statistics and there are fewer than two runs;
     /// [`Error::Value`] for a weight that the kind does not have.
     pub fn new(loaded: &Loaded, descriptor: &Descriptor, options: SimilarityOptions) -> Result<Self, Error> {
-        let SimilarityOptions { kind, centred, weight, metric } = options;
+        let SimilarityOptions { centred, weight, metric, .. } = options;
         let basis = &loaded.basis;
-        let kind = kind.unwrap_or(descriptor.kind);
+        let kind = options.kind_for(descriptor);
         let features = Features::of(basis, descriptor, kind)?;
         let target = features.target(descriptor);
         let needs_study = centred || weight == Weight::Spread || metric == Metric::Mahalanobis;
@@ -138,7 +148,7 @@ impl Comparer {
         let centre = if centred { mean } else { vec![0.0; target.len()] };
         let to_length = match kind {
             Kind::Rotation => 1.0,
-            Kind::Paper => 1.0 / basis.facts.area.sqrt(),
+            Kind::Paper => 1.0 / basis.total_mass().sqrt(),
         };
         let mut comparer = Self { features, centre, weights, target: Vec::new(), metric, to_length, precision: None };
         comparer.target = comparer.transform(target);
@@ -159,16 +169,29 @@ impl Comparer {
     /// # Errors
     /// [`Error::UnknownField`] if it lacks what is compared.
     pub fn score_target(&self, target: &Target) -> Result<Score, Error> {
+        let numbers = self.numbers(target)?;
+        Ok(self.score_numbers(numbers))
+    }
+
+    /// The numbers of a state that was named or projected, as they are compared but for centring and weights.
+    ///
+    /// # Errors
+    /// [`Error::UnknownField`] if it lacks what is compared.
+    pub fn numbers(&self, target: &Target) -> Result<Vec<f64>, Error> {
         let needs = self.features.needs();
         let values: Vec<Vec<f32>> = needs.iter().map(|need| target.on(need)).collect::<Result<_, _>>()?;
         let stored: Vec<Stored<'_>> =
             needs.iter().zip(&values).map(|(need, values)| Stored { values, rms: target.rms(need.function) }).collect();
-        Ok(self.score(&stored))
+        Ok(self.features.vector(&stored))
     }
 
     /// Compares one state. `stored`: one entry for each of [`Features::needs`].
     pub fn score(&self, stored: &[Stored<'_>]) -> Score {
-        let value = self.transform(self.features.vector(stored));
+        self.score_numbers(self.features.vector(stored))
+    }
+
+    fn score_numbers(&self, numbers: Vec<f64>) -> Score {
+        let value = self.transform(numbers);
         match self.metric {
             Metric::Cosine => {
                 let similarity = cosine(&self.target, &value);

@@ -35,3 +35,12 @@ pub(crate) fn double_area([a, b, c]: [Vector; 3]) -> Vector {
 pub(crate) fn area(corners: [Vector; 3]) -> f64 {
     square(double_area(corners)).sqrt() / 2.0
 }
+
+/// Of length 1; a zero vector, of any dimension, stays zero.
+pub(crate) fn unit(mut numbers: Vec<f64>) -> Vec<f64> {
+    let length = numbers.iter().map(|x| x * x).sum::<f64>().sqrt();
+    if length > 0.0 {
+        numbers.iter_mut().for_each(|x| *x /= length);
+    }
+    numbers
+}

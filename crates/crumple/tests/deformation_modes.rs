@@ -8,7 +8,7 @@ mod world;
 
 use std::collections::BTreeSet;
 
-use crumple::modes::{By, Method, Modes, ModesOptions, adjusted_rand_index, load, modes, save};
+use crumple::modes::{By, Membership, Method, Modes, ModesOptions, adjusted_rand_index, load, modes, save};
 use crumple::study::{AddOptions, Loaded};
 use proptest::prelude::*;
 use world::{Model, Point, World, bend, cases, noise, rms};
@@ -107,7 +107,9 @@ fn evidence_is_what_it_says() {
     for method in METHODS {
         for count in [2, 3, 5] {
             let modes = found(&loaded, Some(count), method);
-            let group = |run: usize| modes.modes.iter().position(|mode| mode.name == modes.runs[run].mode).unwrap();
+            let group = |run: usize| {
+                modes.modes.iter().position(|mode| Some(&mode.name) == modes.runs[run].mode.as_ref()).unwrap()
+            };
             let mean_to = |run: usize, mode: usize| {
                 let others: Vec<usize> = (0..14).filter(|&other| other != run && group(other) == mode).collect();
                 others.iter().map(|&other| distances[run][other]).sum::<f64>() / others.len() as f64
@@ -118,10 +120,10 @@ fn evidence_is_what_it_says() {
                 let (a, b) = (mean_to(run, own), others.map(|mode| mean_to(run, mode)).fold(f64::INFINITY, f64::min));
                 let silhouette = if a.is_nan() { 0.0 } else { (b - a) / a.max(b) };
                 // Distances are kept as f32 of f32 coefficients.
-                let error = (modes.runs[run].silhouette - silhouette).abs();
-                assert!(error < 1e-5, "{method:?} {count}, run {run}: {} and {silhouette}", modes.runs[run].silhouette);
+                let told = modes.runs[run].silhouette.unwrap();
+                assert!((told - silhouette).abs() < 1e-5, "{method:?} {count}, run {run}: {told} and {silhouette}");
                 let to_medoid = from_run[number(&modes.modes[own].medoid)];
-                assert!((modes.runs[run].distance - to_medoid).abs() < 1e-5 * (1.0 + to_medoid));
+                assert!((modes.runs[run].distance.unwrap() - to_medoid).abs() < 1e-5 * (1.0 + to_medoid));
             }
             for (at, mode) in modes.modes.iter().enumerate() {
                 let members: Vec<usize> = (0..14).filter(|&run| group(run) == at).collect();
@@ -156,7 +158,7 @@ fn one_mode_is_all_runs_and_as_many_modes_as_runs_are_the_runs() {
     for method in METHODS {
         let one = found(&loaded, Some(1), method);
         assert_eq!((one.modes.len(), one.modes[0].members.len()), (1, 7));
-        assert!(one.runs.iter().all(|run| run.silhouette == 0.0));
+        assert!(one.runs.iter().all(|run| run.silhouette == Some(0.0)));
         let all = found(&loaded, Some(7), method);
         assert_eq!(all.modes.len(), 7, "{method:?}");
         assert!(all.modes.iter().all(|mode| mode.members == [mode.medoid.clone()] && mode.spread < 1e-5));
@@ -180,6 +182,11 @@ fn kinds(run: usize) -> impl Fn(f64, Point) -> Point {
     }
 }
 
+/// The number in a mode's name.
+fn group_of(run: &Membership) -> usize {
+    run.mode.as_ref().unwrap()[5..].parse().unwrap()
+}
+
 #[test]
 fn planted_groups_are_found_and_counted() {
     let world = World::new();
@@ -189,13 +196,16 @@ fn planted_groups_are_found_and_counted() {
     let loaded = world.study(40);
     let planted: Vec<usize> = (0..15).map(|run| run % 3).collect();
     for by in [By::Displacement, By::Rotation] {
-        for method in METHODS {
-            for count in [Some(3), None] {
+        for method in Method::ALL {
+            for count in if method.takes_count() { vec![Some(3), None] } else { vec![None] } {
                 let options = ModesOptions { count, method, by, ..Default::default() };
                 let found = modes(&loaded.study, &options, &()).unwrap();
-                let groups: Vec<usize> = found.runs.iter().map(|run| run.mode[5..].parse().unwrap()).collect();
+                let groups: Vec<usize> = found.runs.iter().map(group_of).collect();
                 assert_eq!(adjusted_rand_index(&groups, &planted), 1.0, "{by:?} {method:?} {count:?}: {groups:?}");
-                assert_eq!((found.given, found.tried.len()), (count.is_some(), if count.is_some() { 1 } else { 7 }));
+                assert_eq!(
+                    (found.given, found.tried.len()),
+                    (count.is_some(), if count.is_some() || !method.takes_count() { 1 } else { 7 })
+                );
             }
         }
     }
@@ -215,8 +225,9 @@ fn the_order_in_which_runs_came_changes_nothing() {
     }
     let one_by_one = Loaded::of(study).unwrap();
     for by in [By::Displacement, By::Rotation] {
-        for method in METHODS {
-            let options = ModesOptions { count: Some(3), method, by, ..Default::default() };
+        for method in Method::ALL {
+            let count = method.takes_count().then_some(3);
+            let options = ModesOptions { count, method, by, ..Default::default() };
             let here = modes(&together.study, &options, &()).unwrap();
             assert_eq!(here, modes(&one_by_one.study, &options, &()).unwrap(), "{by:?} {method:?}");
             assert_eq!(here, modes(&together.study, &options, &()).unwrap());
@@ -227,7 +238,7 @@ fn the_order_in_which_runs_came_changes_nothing() {
 #[test]
 fn modes_are_read_as_they_were_written() {
     let (_world, loaded, _) = scattered(8, 3, |run, p| p.map(|x| x + (run % 2) as f64 * 3.1), 1.0 / 3.0);
-    for method in METHODS {
+    for method in Method::ALL {
         let made = found(&loaded, None, method);
         save(&loaded.study, &made).unwrap();
         assert_eq!(load(&loaded.study).unwrap(), made);
@@ -243,11 +254,11 @@ fn runs_that_are_all_one_have_no_modes_to_tell_apart() {
         }
         let loaded = world.study(20);
         for by in [By::Displacement, By::Rotation] {
-            for method in METHODS {
+            for method in Method::ALL {
                 let options = ModesOptions { count: None, method, by, ..Default::default() };
                 let made = modes(&loaded.study, &options, &()).unwrap();
                 for run in &made.runs {
-                    let still = run.silhouette == 0.0 && run.distance == 0.0 && !run.outlier;
+                    let still = run.silhouette == Some(0.0) && run.distance == Some(0.0) && !run.outlier;
                     assert!(still, "{motion} {by:?} {method:?}: rounding makes {run:?}");
                 }
                 save(&loaded.study, &made).unwrap();

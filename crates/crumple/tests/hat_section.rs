@@ -25,7 +25,8 @@ fn study(folder: &Path, join: Option<f64>) -> Loaded {
         ["run_001", "run_002", "run_007", "run_011", "run_023", "run_042", "run_065", "run_074", "run_088", "run_100"];
     let found = find(&ids.map(|id| runs().join(id))).unwrap();
     let reference = Run::open("run_001", &found[0].path).unwrap();
-    let options = BasisOptions { eigenpairs: 120, join };
+    let options =
+        BasisOptions { eigenpairs: 120, join: join.map(crumple::joints::Join::Distance), ..Default::default() };
     let mut study = Study::create(&folder.join("study"), &reference, &[], &[], &options, &()).unwrap();
     study.add(&found, AddOptions::default(), &()).unwrap();
     Loaded::of(study).unwrap()
@@ -42,7 +43,8 @@ fn the_basis_is_the_one_that_another_program_found() {
         0.0, 4.28215e-5, 1.71102e-4, 3.84292e-4, 5.41045e-4, 5.83858e-4, 6.52623e-4, 6.81481e-4, 6.95421e-4, 7.12163e-4,
     ];
     for (name, join, expected) in [("apart", None, apart), ("joined", Some(2.5), joined)] {
-        let options = BasisOptions { eigenpairs: 10, join };
+        let options =
+            BasisOptions { eigenpairs: 10, join: join.map(crumple::joints::Join::Distance), ..Default::default() };
         let study = Study::create(&folder.path().join(name), &run, &[], &[], &options, &()).unwrap();
         let basis = study.basis().unwrap();
         assert!(basis.facts.complete && relative(basis.facts.area, 138_240.0) < 1e-5);

@@ -36,11 +36,13 @@ fn stored_numbers(study: &Study) {
 fn ask_everything(study: Study) {
     let loaded = Loaded::of(study).unwrap();
     let runs: Vec<String> = loaded.study.manifest().runs.keys().cloned().collect();
-    for method in [Method::KMeans, Method::Ward, Method::Average] {
+    for method in Method::ALL {
         for by in [By::Displacement, By::Rotation] {
             let options = ModesOptions { method, by, ..Default::default() };
             let Ok(made) = modes(&loaded.study, &options, &()) else { continue };
-            let numbers = made.runs.iter().flat_map(|run| [run.distance, run.silhouette]);
+            let numbers =
+                made.runs.iter().flat_map(|run| [run.distance, run.silhouette, run.strength, run.score]).flatten();
+            let numbers = numbers.chain(made.tried.iter().flat_map(|tried| [tried.stability, tried.bic]).flatten());
             assert!(numbers.chain(made.modes.iter().map(|mode| mode.spread)).all(f64::is_finite), "{made:?}");
             save(&loaded.study, &made).unwrap();
             assert_eq!(load(&loaded.study).unwrap(), made);
@@ -123,7 +125,7 @@ proptest! {
             let states = [(0.0, model.nodes.clone()), (1.0, deformed(&model, *deformation))];
             world.write(&format!("run_{number}"), &model.family_of(states));
         }
-        let options = crumple::basis::BasisOptions { eigenpairs: 6, join: None };
+        let options = crumple::basis::BasisOptions { eigenpairs: 6, ..Default::default() };
         let study = Study::create(&world.path("study"), &world.open("run_0"), &[], &[], &options, &());
         // A mesh that cannot be used is refused in words.
         if let Ok(mut study) = study {
@@ -204,7 +206,7 @@ fn a_degenerate_face_beside_good_ones_does_not_stop_the_study() {
     model.shells.push(([49, 50, 50, 50], 0));
     let world = World::new();
     world.write("run", &model.family(2, |t, p| p.map(|x| x * (1.0 + t))));
-    let options = crumple::basis::BasisOptions { eigenpairs: 6, join: None };
+    let options = crumple::basis::BasisOptions { eigenpairs: 6, ..Default::default() };
     let study = Study::create(&world.path("study"), &world.open("run"), &[], &[], &options, &());
     assert!(study.is_ok(), "one shell of a thousand stops the study: {}", study.unwrap_err());
 }

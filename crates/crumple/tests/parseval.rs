@@ -5,10 +5,12 @@
 
 mod world;
 
-use crumple::basis::{Basis, coefficients, synthesize};
+use crumple::basis::{Basis, BasisOptions, coefficients, synthesize};
 use crumple::project::project;
 use crumple::reference::Reference;
-use crumple::study::Rows;
+use crumple::rotation::Ruler;
+use crumple::study::{Rows, Study};
+use crumple::{Kind, Mass};
 use world::{Model, Point, World, bend, energy, noise, relative, rms, rotation, square_distance, triples};
 
 const TOLERANCE: f64 = 1e-6;
@@ -173,4 +175,40 @@ fn noise_is_held_as_well_as_a_smooth_shape() {
     assert!((record.last.captured - 1.0).abs() <= TOLERANCE);
     let area = loaded.basis.facts.area;
     assert!(relative((energy(&triples(rows.row(0))) / area).sqrt(), record.last.rms) <= TOLERANCE);
+}
+
+#[test]
+fn coefficients_and_what_is_compared_with_them_have_the_same_mass() {
+    // Cells from 3 to 21 mm long: a mean over vertices is not a mean over the area.
+    let graded = Model::strip().moved(|[x, y, z]| [x * x / 90.0 + 0.2 * x, y, z]);
+    let world = World::new();
+    world.write("run", &graded.family(4, wild));
+    for kind in [Kind::Cotan, Kind::Tufted, Kind::Polygon] {
+        let mut rms: Vec<f64> = Vec::new();
+        for mass in [Mass::Lumped, Mass::Consistent, Mass::Identity] {
+            let name = format!("{kind}-{mass}");
+            let options = BasisOptions { eigenpairs: usize::MAX, kind, mass, ..Default::default() };
+            let run = world.open("run");
+            let study = Study::create(&world.path(&name), &run, &[], &[], &options, &()).unwrap();
+            let (reference, basis) = (study.reference().unwrap(), study.basis().unwrap());
+            let last = project(&run, &reference, &basis, &[], &()).unwrap().states.pop().unwrap();
+            assert!((last.measures.captured - 1.0).abs() <= TOLERANCE, "{name}: {}", last.measures.captured);
+            let turned = last.measures.turn.powi(2) * basis.total_mass();
+            assert!(relative(energy(&triples(&last.rotation)), turned) <= TOLERANCE, "{name}: all of the rotation");
+            let spectrum = Ruler::of(&basis).spectrum(&triples(&last.rotation), last.measures.turn);
+            assert!(spectrum.octaves.iter().sum::<f64>() <= 1.0 + TOLERANCE, "{name}: {:?}", spectrum.octaves);
+            // Lengths are means over the surface, whatever the mass.
+            rms.push(last.measures.rms);
+            let shape = reference.shape(&run, &reference.place(&run).unwrap(), 3).unwrap();
+            let errors = crumple::reconstruct::errors(&reference, &basis, &shape, reference.mesh.vertices());
+            assert!(relative(errors.rms, last.measures.rms) <= 1e-12, "{name}");
+            assert!(relative(basis.area.iter().sum(), basis.facts.area) < 1e-9, "{name}");
+            if mass == Mass::Identity {
+                assert!(basis.mass.iter().all(|&mass| mass == 1.0));
+                let by_vertex = (energy(&triples(&last.delta)) / basis.total_mass()).sqrt();
+                assert!(relative(by_vertex, last.measures.rms) > 0.01, "{name}: the mesh is one where it matters");
+            }
+        }
+        assert!(rms.iter().all(|other| relative(*other, rms[0]) < 1e-12), "{kind}: {rms:?}");
+    }
 }

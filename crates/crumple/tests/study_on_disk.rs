@@ -39,8 +39,8 @@ fn what_is_read_is_what_was_written() {
     }
     let study = world.empty_study("study", "run_1", 17);
     let reference = crumple::reference::Reference::of_run(&world.open("run_1"), &[]).unwrap();
-    let options = crumple::basis::BasisOptions { eigenpairs: 17, join: None };
-    let basis = crumple::basis::Basis::compute(&reference, &options, &()).unwrap();
+    let options = crumple::basis::BasisOptions { eigenpairs: 17, ..Default::default() };
+    let basis = crumple::basis::Basis::compute(&reference, &[], &options, &()).unwrap();
     let (read_reference, read_basis) = (study.reference().unwrap(), study.basis().unwrap());
     assert_eq!(read_reference.mesh.vertices(), reference.mesh.vertices());
     assert_eq!(read_reference.mesh.triangles(), reference.mesh.triangles());
@@ -315,7 +315,7 @@ fn a_stopped_add_keeps_what_is_finished_even_beside_a_bad_run() {
 #[test]
 fn a_stopped_init_leaves_nothing() {
     let world = bundle(1);
-    let options = crumple::basis::BasisOptions { eigenpairs: 6, join: None };
+    let options = crumple::basis::BasisOptions { eigenpairs: 6, ..Default::default() };
     let stopped = Study::create(
         &world.path("study"),
         &world.open("run_000"),

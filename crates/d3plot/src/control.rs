@@ -10,11 +10,16 @@ use crate::error::{Error, LooksLike};
 use crate::members::Stream;
 use crate::words::{ByteOrder, Precision, Words, decode_text, trim_end};
 
+/// Parts beyond a few are believed only where the files have this many words for each: a part has a title of 72 bytes,
+/// three numbers, and elements.
+const WORDS_OF_A_PART: u64 = 64;
+const FEW_PARTS: u64 = 2048;
+
 /// What NCFDV1 holds when several solvers wrote into one file.
 const MULTI_SOLVER: i64 = 67_108_864;
 
 /// The words of the control block, as they are needed: counts are checked, flags are taken apart.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Control {
     pub(crate) words: Words,
     pub(crate) title: Vec<u8>,
@@ -60,15 +65,23 @@ pub(crate) struct Control {
     pub(crate) shell_strain: bool,
     pub(crate) solid_stress: bool,
     pub(crate) solid_strain: bool,
+    /// IOSHL 3 and 4: force resultants (8 words), thickness with two further words and internal energy (4 words).
+    pub(crate) shell_resultants: bool,
+    pub(crate) shell_thickness: bool,
     pub(crate) fluid_parts: u64,
     pub(crate) adapted: u64,
     pub(crate) parts: u64,
+    /// More parts than this the files cannot hold.
+    pub(crate) most_parts: u64,
+    /// Parts of solids, beams, shells, SPH, thick shells.
+    pub(crate) parts_of_kind: [u64; 5],
     pub(crate) idtdt: i64,
     pub(crate) extra: u64,
     pub(crate) nel48: u64,
     pub(crate) nel20: u64,
     pub(crate) nt3d: u64,
     pub(crate) nel27: u64,
+    pub(crate) neipb: u64,
     pub(crate) nel21p: u64,
     pub(crate) nel15t: u64,
     pub(crate) nel20t: u64,
@@ -137,13 +150,17 @@ impl Control {
         };
         let nel8 = word.within("NEL8", 23, -most, most)?;
         let penout = word.within("PENOUT", 78, 0, 2)?;
+        let parts_of_kind = [24, 29, 32, 38, 41].map(|at| word.int(at).clamp(0, most).unsigned_abs());
         let parts = match word.count("NMMAT", 51)? {
             // files of before this word: every kind of element has its own count
-            0 => {
-                [24, 29, 32, 38, 41].iter().map(|&at| word.int(at).clamp(0, most) as u64).sum::<u64>().min(most as u64)
-            }
+            0 => parts_of_kind.iter().fold(0_u64, |sum, of| sum.saturating_add(*of)).min(most.unsigned_abs()),
             count => count,
         };
+        // a part needs a title and a number in the file; no more than the file can have are believed
+        let most_parts = (most.unsigned_abs() / WORDS_OF_A_PART).max(FEW_PARTS);
+        if parts > most_parts {
+            return Err(word.wrong("NMMAT", 51, &format!("0 to {most_parts}, for files of this size,")));
+        }
         let written = |at: usize, by: &[i64]| by.contains(&word.int(at));
         let release = trim_end(&head[13 * size as usize..13 * size as usize + 4]);
         Ok(Control {
@@ -184,15 +201,20 @@ impl Control {
             shell_strain: written(44, &[1000]),
             solid_stress: written(43, &[999, 1000]),
             solid_strain: written(44, &[999, 1000]),
+            shell_resultants: written(45, &[1000]),
+            shell_thickness: written(46, &[1000]),
             fluid_parts: word.count("IALEMAT", 47)?,
             adapted: word.count("NADAPT", 50)?,
             parts,
+            most_parts,
+            parts_of_kind,
             idtdt: word.within("IDTDT", 56, 0, i32::MAX.into())?,
             extra,
             nel48: word.count("NEL48", 55)?,
             nel20: word.count("NEL20", 64)?,
             nt3d: word.words_each("NT3D", 65)?,
             nel27: word.count("NEL27", 66)?,
+            neipb: word.words_each("NEIPB", 67)?,
             nel21p: word.count("NEL21P", 68)?,
             nel15t: word.count("NEL15T", 69)?,
             nel20t: word.count("NEL20T", 71)?,

@@ -61,21 +61,22 @@ impl<'a> Cursor<'a> {
         self.skip_bytes(count, each.saturating_mul(self.words.size()), name)
     }
 
-    /// The bytes of `count` things of `each` words.
-    pub(crate) fn take(&mut self, count: u64, each: u64, name: &'static str) -> Result<Vec<u8>, Error> {
-        let section = self.skip(count, each, name)?;
-        self.bytes_of(section)
-    }
-
     /// The bytes of a section that was passed.
     pub(crate) fn bytes_of(&self, section: Section) -> Result<Vec<u8>, Error> {
         self.stream.read(section.start, section.bytes)
     }
 
+    /// Hands the bytes of a section that was passed to `take`, some rows of `row` bytes at a time.
+    pub(crate) fn pieces(&self, section: Section, row: u64, take: impl FnMut(&[u8])) -> Result<(), Error> {
+        self.stream.pieces(section.start, section.bytes, row, take)
+    }
+
     /// `count` integers.
     pub(crate) fn ints(&mut self, count: u64, name: &'static str) -> Result<Vec<i64>, Error> {
-        let bytes = self.take(count, 1, name)?;
-        Ok(self.words.ints(&bytes).collect())
+        let section = self.skip(count, 1, name)?;
+        let mut ints = Vec::with_capacity((section.bytes / self.words.size()) as usize);
+        self.pieces(section, self.words.size(), |bytes| ints.extend(self.words.ints(bytes)))?;
+        Ok(ints)
     }
 
     /// One integer.

@@ -16,10 +16,11 @@ pub(crate) const FEMZIP: i64 = 76_893_465;
 const ENOUGH: u32 = 15;
 
 /// Which database of LS-DYNA a family is; all four have the same layout.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[non_exhaustive]
 pub enum FileType {
     /// d3plot: the states of a run.
+    #[default]
     D3plot,
     /// d3drlf: states of a dynamic relaxation.
     D3drlf,
@@ -38,6 +39,16 @@ impl FileType {
             11 => FileType::D3eigv,
             _ => return None,
         })
+    }
+
+    /// INUM.
+    pub(crate) fn number(self) -> i64 {
+        match self {
+            FileType::D3plot => 1,
+            FileType::D3drlf => 2,
+            FileType::D3part => 5,
+            FileType::D3eigv => 11,
+        }
     }
 
     /// The usual name of the root file.

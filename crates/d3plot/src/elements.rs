@@ -51,7 +51,7 @@ pub struct Particle {
 pub struct Geometry {
     /// N × 3, initial positions in the model's length unit (z = 0 in plane models).
     pub coordinates: Vec<[f64; 3]>,
-    /// N user numbers, 1, 2, 3 … where the file has none.
+    /// N user numbers; empty where the file has none, which stands for 1, 2, 3 … (so do the other lists of numbers).
     pub node_ids: Vec<u64>,
     /// Shells, rigid ones too.
     pub shells: Vec<Shell>,
@@ -73,4 +73,11 @@ pub struct Geometry {
     pub beam_ids: Vec<u64>,
     /// SPH particles.
     pub sph: Vec<Particle>,
+}
+
+impl Geometry {
+    /// User number of the node at `index`: its place from 1 where the file has no numbers.
+    pub fn node_id(&self, index: usize) -> u64 {
+        self.node_ids.get(index).copied().unwrap_or(index as u64 + 1)
+    }
 }

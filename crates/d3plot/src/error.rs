@@ -1,4 +1,4 @@
-//! Why a family cannot be read: what is wrong, where, what was expected, and what to do about it.
+//! Why a family cannot be read or written: what is wrong, where, what was expected, and what to do about it.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -132,6 +132,18 @@ pub enum Error {
         /// States there are.
         states: usize,
     },
+    /// A row that a field does not have.
+    #[error("{path}: row {row} (counted from 0) of '{field}' asked for, it has {rows}")]
+    NoSuchRow {
+        /// The root.
+        path: PathBuf,
+        /// The field.
+        field: &'static str,
+        /// The row asked for, from 0.
+        row: u64,
+        /// Rows there are.
+        rows: u64,
+    },
     /// A named layer that the states do not have.
     #[error("{path}: {what} asked for, but with {layers} points an element the file does not say which point that is")]
     Layer {
@@ -151,6 +163,20 @@ pub enum Error {
         expected: u64,
         /// Bytes found now.
         found: u64,
+    },
+    /// A family that is to be written would overwrite a file, or take one of another run for its own.
+    #[error("{path}: already there; nothing is overwritten")]
+    Exists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// What is to be written does not fit the format, or what was said about the family before.
+    #[error("{path}: cannot be written: {what}")]
+    Content {
+        /// The file that was to be written.
+        path: PathBuf,
+        /// What is wrong, and what was expected.
+        what: String,
     },
     /// The operating system refused.
     #[error("{path}: {action}: {source}")]
@@ -191,8 +217,11 @@ impl Error {
                 "the family has no whole state; was the run stopped early?".to_owned()
             }
             Error::NoSuchState { states, .. } => format!("ask for a state from 0 to {}", states - 1),
+            Error::NoSuchRow { .. } => "ask for nodes and elements of this family's geometry".to_owned(),
             Error::Layer { .. } => "ask for the maximum, minimum or mean, or for all points".to_owned(),
             Error::Changed { .. } => "open the family again when nothing writes to it any more".to_owned(),
+            Error::Exists { .. } => "name another file or folder, or remove the old family first".to_owned(),
+            Error::Content { .. } => return None,
             Error::Io { source, .. } => match source.kind() {
                 io::ErrorKind::PermissionDenied => "ask for the right to read it".to_owned(),
                 _ => return None,
@@ -215,8 +244,11 @@ impl Error {
             | Error::Count { path, .. }
             | Error::Geometry { path, .. }
             | Error::NoSuchState { path, .. }
+            | Error::NoSuchRow { path, .. }
             | Error::Layer { path, .. }
             | Error::Changed { path, .. }
+            | Error::Exists { path }
+            | Error::Content { path, .. }
             | Error::Io { path, .. } => path,
         }
     }

@@ -10,6 +10,7 @@ use crate::error::Error;
 use crate::geometry::{Reading, read_geometry};
 use crate::members::{Stream, member_number};
 use crate::parts::{Part, assemble};
+use crate::quantity::{Quantity, quantities};
 use crate::rigid::uncertain_rigid_bodies;
 use crate::roots::roots;
 use crate::state::{Field, Layout, Variant};
@@ -41,6 +42,8 @@ pub struct Family {
     pub(crate) control: Control,
     pub(crate) reading: Reading,
     pub(crate) layout: Layout,
+    /// What the words of the elements are.
+    pub(crate) quantities: Vec<Quantity>,
     /// Byte of the stream at which each state starts.
     pub(crate) starts: Vec<u64>,
     header: Header,
@@ -48,6 +51,15 @@ pub struct Family {
     times: Vec<f64>,
     members: Vec<Member>,
     warnings: Vec<Warning>,
+}
+
+/// How a family is read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct ReadOptions {
+    /// Map the files into memory instead of reading them piece by piece. That spares a copy, and is safe only if no
+    /// process cuts or changes the files while the family is open: a map of a file that becomes shorter ends this program by
+    /// a signal, where plain reading gives [`Error::Changed`]. Never for a run that is still being written.
+    pub map: bool,
 }
 
 /// A file of the family.
@@ -73,20 +85,51 @@ impl Family {
     /// Any [`Error`] but [`Error::NoSuchState`] and [`Error::Layer`]: what is there is not a family, or its control
     /// block or geometry cannot be read with certainty.
     pub fn open(path: &Path) -> Result<Family, Error> {
-        let data = std::fs::metadata(path).map_err(Error::io(path, "looking at it"))?;
-        if data.is_dir() { Family::open_root(&only_root(path)?) } else { Family::open_root(path) }
+        Family::open_with(path, ReadOptions::default())
     }
 
-    fn open_root(root: &Path) -> Result<Family, Error> {
+    /// As [`Family::open`], with another way of reading.
+    ///
+    /// # Errors
+    /// As [`Family::open`].
+    pub fn open_with(path: &Path, options: ReadOptions) -> Result<Family, Error> {
+        let data = std::fs::metadata(path).map_err(Error::io(path, "looking at it"))?;
+        let root = if data.is_dir() { only_root(path)? } else { path.to_owned() };
         let mut warnings = Vec::new();
-        let stream = Stream::find(root, &mut warnings)?;
-        let control = Control::read(&stream).map_err(|error| state_file(root, error))?;
+        let stream = Stream::find(&root, options.map, &mut warnings)?;
+        Family::of_stream(stream, warnings).map_err(|error| state_file(&root, error))
+    }
+
+    /// A family of bytes that are in memory: out of an archive, or from another machine. The first file is the root; the
+    /// others are its members if their names are the root's with a number behind it, and are passed over if not.
+    ///
+    /// # Errors
+    /// As [`Family::open`]; [`Error::NotFound`] if there is no file.
+    pub fn of_bytes(files: Vec<(PathBuf, Vec<u8>)>) -> Result<Family, Error> {
+        let Some(root) = files.first().map(|(path, _)| path.clone()) else {
+            return Err(Error::NotFound { path: PathBuf::new() });
+        };
+        let number = |path: &Path| {
+            let suffix = path.as_os_str().as_encoded_bytes().strip_prefix(root.as_os_str().as_encoded_bytes())?;
+            if suffix.is_empty() { Some(0) } else { member_number(suffix) }
+        };
+        let mut files: Vec<(u32, PathBuf, Vec<u8>)> =
+            files.into_iter().filter_map(|(path, bytes)| Some((number(&path)?, path, bytes))).collect();
+        files.sort_by_key(|file| file.0);
+        files.dedup_by_key(|file| file.0);
+        let mut warnings = Vec::new();
+        let stream = Stream::of_memory(files, &mut warnings);
+        Family::of_stream(stream, warnings)
+    }
+
+    fn of_stream(stream: Stream, mut warnings: Vec<Warning>) -> Result<Family, Error> {
+        let control = Control::read(&stream)?;
         let mut reading = read_geometry(&control, &stream)?;
         if !reading.numbers_agree {
-            warnings.push(Warning::UserNumbers { path: root.to_owned() });
+            warnings.push(Warning::UserNumbers { path: stream.root().to_owned() });
         }
         let titles = read_titles(&control, &stream, &reading, &mut warnings)?;
-        let parts = assemble(&control, &mut reading, &titles, &mut warnings);
+        let parts = assemble(&control, &mut reading, &titles, &stream, &mut warnings)?;
         if let Some(active) = &reading.active {
             warnings.push(Warning::RigidNodes { count: control.nodes.saturating_sub(active.len() as u64) });
         }
@@ -104,7 +147,8 @@ impl Family {
             members[stream.member_at(start)].states += 1;
         }
         let header = header(&control, &titles, &layout);
-        Ok(Family { stream, control, reading, layout, starts, header, parts, times, members, warnings })
+        let quantities = quantities(&control);
+        Ok(Family { stream, control, reading, layout, quantities, starts, header, parts, times, members, warnings })
     }
 
     /// The root file.
@@ -142,15 +186,15 @@ impl Family {
         &self.warnings
     }
 
-    /// The tables that every state holds, in the order of the file, and behind them what is computed out of them:
-    /// `coordinates` (where the file has `displacement`), `shell_plastic_strain`, `solid_plastic_strain`,
-    /// `thick_shell_plastic_strain` (columns: points an element).
+    /// The tables that every state holds, in the order of the file, and behind them what is taken out of them:
+    /// `coordinates` where the file has `displacement`, and quantities of elements such as `shell_stress` (columns: points
+    /// times components). [`Family::values`] reads each of them.
     pub fn fields(&self) -> Vec<Field> {
         let mut fields = self.layout.fields.clone();
         if let Some(displacement) = self.layout.field("displacement") {
             fields.push(Field { name: "coordinates", ..displacement.clone() });
         }
-        fields.extend(self.strain_fields());
+        fields.extend(self.quantity_fields());
         fields
     }
 }
@@ -211,7 +255,7 @@ fn locate(
     let mut walker = Walker::new(stream, control.words, titles.states_from, control.iu == 0);
     let walk = walker.walk(declared.words)?;
     let mut best: Option<(Layout, Walk, String)> = None;
-    if walk.doubtful > 0 {
+    if !walk.is_settled() {
         for (variant, reason) in manual.alternatives(reading) {
             let Some(layout) = variant.layout(control, reading).filter(|layout| layout.words != declared.words) else {
                 continue;

@@ -17,23 +17,27 @@ use crate::rigid::{Rigid, rigid_bodies, uncertain_rigid_bodies};
 pub(crate) const END_MARK: f64 = -999_999.0;
 
 /// The geometry and what its sections say about the states.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Reading {
     pub(crate) geometry: Geometry,
     /// Part numbers by internal order.
     pub(crate) part_ids: Option<Vec<u64>>,
     /// Whether the numbering repeats the counts of the control block (or there is none).
     pub(crate) numbers_agree: bool,
+    /// Numbers of the material models of the parts; empty where the file does not tell.
+    pub(crate) material_types: Vec<i64>,
     /// NUMRBE: shells without words in the states.
     pub(crate) rigid_shells: u64,
-    /// Words an SPH particle has in a state.
+    /// Lengths of what an SPH particle has in a state, the length of their list first.
+    pub(crate) sph_flags: Vec<i64>,
+    /// Words an SPH particle has in a state: one for its part and as many as the flags add up to.
     pub(crate) sph_words: u64,
     pub(crate) airbags: Airbags,
     /// NDIM 8, 9: the nodes, from 0, that the nodal blocks hold.
     pub(crate) active: Option<Vec<u32>>,
     pub(crate) rigid_bodies: u64,
     /// NDIM 8, 9: every node is either in a rigid body or active.
-    rigid_and_active_are_all: bool,
+    pub(crate) rigid_and_active_are_all: bool,
     pub(crate) road_surfaces: u64,
     /// Byte of the stream behind the last section.
     pub(crate) end: u64,
@@ -51,53 +55,78 @@ struct Choice {
     /// Words of a 27-node solid and of a 15-node tetrahedron in the extra connectivity.
     words27: u64,
     words15: u64,
+    /// Keep the mesh; `false` only looks whether everything fits, without memory for it.
+    keep: bool,
 }
 
 /// Reads the geometry; where the layout is open, all readings are tried and the one that checks is taken.
 pub(crate) fn read_geometry(control: &Control, stream: &Stream) -> Result<Reading, Error> {
-    let material_choices: &[bool] = if control.rigid_bodies() { &[false, true] } else { &[control.material_section()] };
-    let once_choices: &[bool] = if control.rigid_bodies() { &[false, true] } else { &[false] };
-    let choices27: &[u64] = if control.quadratic && control.nel27 > 0 { &[28, 20] } else { &[28] };
-    let choices15: &[u64] = if control.quadratic && control.nel15t > 0 { &[16, 8] } else { &[16] };
-    let (mut readings, mut first_error) = (Vec::new(), None);
-    for &materials in material_choices {
-        for &once in once_choices {
-            for &words27 in choices27 {
-                for &words15 in choices15 {
-                    match read_one(control, stream, Choice { materials, once, words27, words15 }) {
-                        Ok(reading) => readings.push(reading),
-                        Err(error) => first_error = first_error.or(Some(error)),
-                    }
-                }
+    let choices = choices(control);
+    if control.rigid_bodies() {
+        let choice = the_certain_one(control, stream, &choices)?;
+        return read_one(control, stream, choice);
+    }
+    let [choice] = choices[..] else {
+        return read_one(control, stream, first_that_checks(control, stream, &choices));
+    };
+    let reading = read_one(control, stream, choice)?;
+    let checks = reading.numbers_agree && reading.mark;
+    if control.airbags > 0 && !checks { Err(uncertain_airbags(stream)) } else { Ok(reading) }
+}
+
+/// Every way to read the geometry, the manual's first.
+fn choices(control: &Control) -> Vec<Choice> {
+    let materials: &[bool] = if control.rigid_bodies() { &[false, true] } else { &[control.material_section()] };
+    let once: &[bool] = if control.rigid_bodies() { &[false, true] } else { &[false] };
+    let words27: &[u64] = if control.quadratic && control.nel27 > 0 { &[28, 20] } else { &[28] };
+    let words15: &[u64] = if control.quadratic && control.nel15t > 0 { &[16, 8] } else { &[16] };
+    let mut choices = Vec::new();
+    for &materials in materials {
+        for &once in once {
+            for &words27 in words27 {
+                choices.extend(words15.iter().map(|&words15| Choice { materials, once, words27, words15, keep: true }));
             }
         }
     }
-    match first_error {
-        Some(error) if readings.is_empty() => Err(error),
-        _ if control.rigid_bodies() => the_certain_one(control, stream, readings),
-        _ => {
-            let reading = best(readings);
-            let checks = reading.numbers_agree && reading.mark;
-            if control.airbags > 0 && !checks { Err(uncertain_airbags(stream)) } else { Ok(reading) }
-        }
-    }
+    choices
 }
 
-/// The first reading whose numbering agrees and that ends in the mark, or simply the first.
-fn best(mut readings: Vec<Reading>) -> Reading {
-    let checks = |reading: &Reading| reading.numbers_agree && reading.mark;
-    let place = readings.iter().position(checks).unwrap_or(0);
-    readings.swap_remove(place)
+/// The first choice whose numbering agrees and that ends in the mark, or simply the first.
+fn first_that_checks(control: &Control, stream: &Stream, choices: &[Choice]) -> Choice {
+    let checks = |choice: &&Choice| {
+        let reading = read_one(control, stream, Choice { keep: false, ..**choice });
+        reading.is_ok_and(|reading| reading.numbers_agree && reading.mark)
+    };
+    *choices.iter().find(checks).unwrap_or(&choices[0])
 }
 
 /// NDIM 8, 9: no sample is known, so a reading must check in all respects: numbering, end mark, and every node either
 /// in a rigid body or active; and no other reading may do so with other nodes.
-fn the_certain_one(control: &Control, stream: &Stream, mut readings: Vec<Reading>) -> Result<Reading, Error> {
-    readings.retain(|reading| reading.numbers_agree && reading.mark && reading.rigid_and_active_are_all);
-    readings.dedup_by(|a, b| (&a.active, a.rigid_shells) == (&b.active, b.rigid_shells));
-    match (readings.pop(), readings.is_empty()) {
-        (Some(reading), true) => Ok(reading),
-        _ => Err(uncertain_rigid_bodies(control, stream)),
+fn the_certain_one(control: &Control, stream: &Stream, choices: &[Choice]) -> Result<Choice, Error> {
+    let (mut certain, mut first_error): (Option<(Choice, Reading)>, _) = (None, None);
+    let mut read = 0;
+    for &choice in choices {
+        let reading = match read_one(control, stream, Choice { keep: false, ..choice }) {
+            Ok(reading) => reading,
+            Err(error) => {
+                first_error = first_error.or(Some(error));
+                continue;
+            }
+        };
+        read += 1;
+        if !(reading.numbers_agree && reading.mark && reading.rigid_and_active_are_all) {
+            continue;
+        }
+        let same = |other: &Reading| (&other.active, other.rigid_shells) == (&reading.active, reading.rigid_shells);
+        if certain.as_ref().is_some_and(|(_, other)| !same(other)) {
+            return Err(uncertain_rigid_bodies(control, stream));
+        }
+        certain = certain.or(Some((choice, reading)));
+    }
+    match (certain, first_error) {
+        (Some((choice, _)), _) => Ok(choice),
+        (None, Some(error)) if read == 0 => Err(error),
+        (None, _) => Err(uncertain_rigid_bodies(control, stream)),
     }
 }
 
@@ -126,15 +155,16 @@ fn read_sections(control: &Control, stream: &Stream, choice: Choice, cursor: &mu
         types = cursor.ints(count, "material types")?;
     }
     cursor.skip(control.fluid_parts, 1, "fluid parts")?;
-    let sph_words = if control.sph > 0 { sph_words(cursor)? } else { 0 };
+    let sph_flags = if control.sph > 0 { sph_flags(cursor)? } else { Vec::new() };
     let airbags = read_airbags(control, cursor)?;
 
-    let mut geometry = Geometry { coordinates: coordinates(control, cursor)?, ..Geometry::default() };
-    geometry.solids = elements(control, cursor, control.solids, "solids", solid)?;
-    geometry.thick_shells = elements(control, cursor, control.thick_shells, "thick shells", solid)?;
-    geometry.beams = elements(control, cursor, control.beams, "beams", beam)?;
-    geometry.shells = elements(control, cursor, control.shells, "shells", shell)?;
-    let Numbers { agree, nodes, solids, beams, shells, thick_shells, parts } = read_numbers(control, cursor)?;
+    let keep = choice.keep;
+    let mut geometry = Geometry { coordinates: coordinates(control, cursor, keep)?, ..Geometry::default() };
+    geometry.solids = elements(control, cursor, control.solids, "solids", solid, keep)?;
+    geometry.thick_shells = elements(control, cursor, control.thick_shells, "thick shells", solid, keep)?;
+    geometry.beams = elements(control, cursor, control.beams, "beams", beam, keep)?;
+    geometry.shells = elements(control, cursor, control.shells, "shells", shell, keep)?;
+    let Numbers { agree, nodes, solids, beams, shells, thick_shells, parts } = read_numbers(control, cursor, keep)?;
     geometry.node_ids = nodes;
     geometry.solid_ids = solids;
     geometry.beam_ids = beams;
@@ -147,7 +177,7 @@ fn read_sections(control: &Control, stream: &Stream, choice: Choice, cursor: &mu
 
     let rigid = if control.rigid_bodies() { rigid_bodies(control, cursor, choice.once)? } else { Rigid::default() };
     cursor.skip(control.adapted, 2, "parents of adapted elements")?;
-    geometry.sph = elements(control, cursor, control.sph, "SPH particles", particle)?;
+    geometry.sph = elements(control, cursor, control.sph, "SPH particles", particle, keep)?;
     airbags.skip_geometry(control, cursor)?;
     let road_surfaces = if control.road() { road(cursor)? } else { 0 };
     extra_connectivity(control, cursor, choice)?;
@@ -159,8 +189,10 @@ fn read_sections(control: &Control, stream: &Stream, choice: Choice, cursor: &mu
         geometry,
         part_ids: parts,
         numbers_agree: agree,
+        material_types: types,
         rigid_shells,
-        sph_words,
+        sph_words: sph_words(&sph_flags),
+        sph_flags,
         airbags,
         active: rigid.active,
         rigid_bodies: rigid.bodies,
@@ -171,40 +203,48 @@ fn read_sections(control: &Control, stream: &Stream, choice: Choice, cursor: &mu
     })
 }
 
-/// Words an SPH particle has in a state: one for its part and as many as the flags add up to. The first flag is the
-/// length of their list, 10 or 11 by the manuals.
-fn sph_words(cursor: &mut Cursor) -> Result<u64, Error> {
+/// The list of flags of SPH particles. The first is the length of the list, 10 or 11 by the manuals.
+fn sph_flags(cursor: &mut Cursor) -> Result<Vec<i64>, Error> {
     let start = cursor.at();
     let length = cursor.count("SPH flags")?;
     if !(1..=64).contains(&length) {
         return Err(cursor.wrong("SPH flags", start, format!("a list of {length} flags"), "10 or 11 flags".to_owned()));
     }
-    let flags = cursor.ints(length - 1, "SPH flags")?;
-    let words = flags.iter().fold(1_u64, |sum, flag| sum.saturating_add(flag.unsigned_abs()));
+    let mut flags = vec![length as i64];
+    flags.extend(cursor.ints(length - 1, "SPH flags")?);
+    let words = sph_words(&flags);
     if words > 1000 {
         return Err(cursor.wrong("SPH flags", start, format!("{words} words a particle"), "at most 1000".to_owned()));
     }
-    Ok(words)
+    Ok(flags)
 }
 
-fn coordinates(control: &Control, cursor: &mut Cursor) -> Result<Vec<[f64; 3]>, Error> {
+/// One word for the part of a particle and as many as the flags behind the first add up to.
+pub(crate) fn sph_words(flags: &[i64]) -> u64 {
+    match flags {
+        [] => 0,
+        [_, lengths @ ..] => lengths.iter().fold(1_u64, |sum, flag| sum.saturating_add(flag.unsigned_abs())),
+    }
+}
+
+fn coordinates(control: &Control, cursor: &mut Cursor, keep: bool) -> Result<Vec<[f64; 3]>, Error> {
     let dimensions = control.dimensions();
-    let bytes = cursor.take(control.nodes, dimensions, "node coordinates")?;
-    Ok(points(control, &bytes))
-}
-
-/// Positions out of words: z = 0 in plane models.
-pub(crate) fn points(control: &Control, bytes: &[u8]) -> Vec<[f64; 3]> {
-    let size = control.words.size() as usize;
-    let each = control.dimensions() as usize * size;
-    let point = |node: &[u8]| {
-        let mut point = [0.0; 3];
-        for (coordinate, value) in point.iter_mut().zip(control.words.floats(node)) {
-            *coordinate = value;
-        }
-        point
-    };
-    bytes.chunks_exact(each).map(point).collect()
+    let section = cursor.skip(control.nodes, dimensions, "node coordinates")?;
+    if !keep {
+        return Ok(Vec::new());
+    }
+    let row = dimensions * control.words.size();
+    let mut points = Vec::with_capacity((section.bytes / row) as usize);
+    cursor.pieces(section, row, |bytes| {
+        points.extend(bytes.chunks_exact(row as usize).map(|node| {
+            let mut point = [0.0; 3];
+            for (coordinate, value) in point.iter_mut().zip(control.words.floats(node)) {
+                *coordinate = value;
+            }
+            point
+        }));
+    })?;
+    Ok(points)
 }
 
 /// How the words of one element become an element; `None` if a node or the part is out of range.
@@ -216,24 +256,34 @@ fn elements<T, const W: usize>(
     count: u64,
     section: &'static str,
     decode: Decode<T, W>,
+    keep: bool,
 ) -> Result<Vec<T>, Error> {
     let start = cursor.at();
-    let bytes = cursor.take(count, W as u64, section)?;
+    let passed = cursor.skip(count, W as u64, section)?;
     let nodes = i64::try_from(control.nodes).unwrap_or(i64::MAX);
-    let mut elements = Vec::with_capacity(bytes.len() / (W * control.words.size() as usize));
-    let mut words = [0; W];
-    for (index, element) in bytes.chunks_exact(W * control.words.size() as usize).enumerate() {
-        for (word, value) in words.iter_mut().zip(control.words.ints(element)) {
-            *word = value;
+    let row = W as u64 * control.words.size();
+    let mut elements = Vec::with_capacity(if keep { (passed.bytes / row) as usize } else { 0 });
+    let (mut index, mut wrong) = (0, None);
+    cursor.pieces(passed, row, |bytes| {
+        let mut words = [0; W];
+        for element in bytes.chunks_exact(row as usize) {
+            for (word, value) in words.iter_mut().zip(control.words.ints(element)) {
+                *word = value;
+            }
+            match decode(&words, nodes) {
+                Some(element) if keep => elements.push(element),
+                Some(_) => {}
+                None => wrong = wrong.or(Some((index, words))),
+            }
+            index += 1;
         }
-        let Some(element) = decode(&words, nodes) else {
-            let found = format!("{words:?} for element {index} (counted from 0)");
-            let expected = format!("nodes from 1 to {nodes} and a part from 1 on");
-            return Err(cursor.wrong(section, start, found, expected));
-        };
-        elements.push(element);
-    }
-    Ok(elements)
+    })?;
+    let Some((index, words)): Option<(usize, [i64; W])> = wrong else {
+        return Ok(elements);
+    };
+    let found = format!("{words:?} for element {index} (counted from 0)");
+    let expected = format!("nodes from 1 to {nodes} and a part from 1 on");
+    Err(cursor.wrong(section, start, found, expected))
 }
 
 /// A number that counts from 1 to `most` as an index from 0.

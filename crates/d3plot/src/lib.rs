@@ -23,6 +23,7 @@
 // bytes and files
 mod cursor;
 mod error;
+mod map;
 mod members;
 mod warning;
 mod words;
@@ -41,24 +42,34 @@ mod rigid;
 mod titles;
 
 // the states
+mod quantity;
+mod ranges;
 mod results;
+mod series;
 mod state;
 mod strain;
+mod values;
 mod walk;
 
 // the family
 mod family;
 mod roots;
+mod write;
 
 pub use control::Header;
 pub use detect::FileType;
 pub use elements::{Beam, Geometry, Particle, Shell, Solid};
 pub use error::{Error, LooksLike};
-pub use family::{Family, Member};
+pub use family::{Family, Member, ReadOptions};
 pub use parts::Part;
+pub use ranges::{Component, Range};
 pub use results::{Deletion, Table};
 pub use roots::{Refused, Root, Roots, roots};
+pub use series::{Series, StateValues};
 pub use state::Field;
-pub use strain::Layers;
+pub use values::{Layers, Real, Rows};
 pub use warning::Warning;
 pub use words::{ByteOrder, Precision};
+pub use write::{
+    Content, Copied, DeletionTable, Positions, StateWriter, Stored, Thermal, WordsEach, WriteOptions, Writer,
+};

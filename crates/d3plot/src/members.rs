@@ -5,10 +5,11 @@
 
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use crate::detect;
 use crate::error::Error;
+use crate::map::Map;
 use crate::warning::Warning;
 
 /// One file of the family.
@@ -28,17 +29,31 @@ impl MemberFile {
     }
 }
 
-/// The members of a family in order, and the file read last, kept open.
+/// The members of a family in order, and where their bytes come from.
 #[derive(Debug)]
 pub(crate) struct Stream {
     members: Vec<MemberFile>,
-    latest: Mutex<Option<(usize, Arc<File>)>>,
+    source: Source,
 }
+
+/// Where bytes come from.
+#[derive(Debug)]
+enum Source {
+    /// Positioned reads; the file read last is kept open.
+    Files(Latest),
+    /// Files mapped into memory when they are first needed.
+    Maps(Vec<OnceLock<Map>>),
+    /// Bytes that the caller has.
+    Memory(Vec<Vec<u8>>),
+}
+
+/// Bytes read at a time where they are decoded at once: a buffer of this size stays in the processor's cache.
+const PIECE: u64 = 1 << 17;
 
 impl Stream {
     /// Finds the members of the family of `root` in its folder: names are compared as strings of bytes, so that no
     /// character of a name means anything.
-    pub(crate) fn find(root: &Path, warnings: &mut Vec<Warning>) -> Result<Stream, Error> {
+    pub(crate) fn find(root: &Path, map: bool, warnings: &mut Vec<Warning>) -> Result<Stream, Error> {
         let bytes = fs::metadata(root).map_err(Error::io(root, "looking at it"))?.len();
         let mut found = vec![(0, root.to_owned(), bytes)];
         let mut levels = Vec::new();
@@ -70,16 +85,18 @@ impl Stream {
             levels.sort();
             warnings.push(Warning::AdaptiveLevels { levels });
         }
-        let mut members: Vec<MemberFile> = Vec::with_capacity(found.len());
-        for (number, path, bytes) in found {
-            let start = members.last().map_or(0, MemberFile::end);
-            if let Some(last) = members.last().filter(|last| number > last.number + 1) {
-                let count = number - last.number - 1;
-                warnings.push(Warning::MissingMembers { after: last.path.clone(), before: path.clone(), count });
-            }
-            members.push(MemberFile { path, number, start, bytes });
-        }
-        Ok(Stream { members, latest: Mutex::new(None) })
+        let source = match map {
+            true => Source::Maps(found.iter().map(|_| OnceLock::new()).collect()),
+            false => Source::Files(Mutex::new(None)),
+        };
+        Ok(Stream { members: in_a_row(found, warnings), source })
+    }
+
+    /// A family whose bytes the caller has: the root first, then the members with their numbers, rising.
+    pub(crate) fn of_memory(files: Vec<(u32, PathBuf, Vec<u8>)>, warnings: &mut Vec<Warning>) -> Stream {
+        let found = files.iter().map(|(number, path, bytes)| (*number, path.clone(), bytes.len() as u64)).collect();
+        let source = Source::Memory(files.into_iter().map(|(_, _, bytes)| bytes).collect());
+        Stream { members: in_a_row(found, warnings), source }
     }
 
     pub(crate) fn members(&self) -> &[MemberFile] {
@@ -126,28 +143,90 @@ impl Stream {
 
     /// `count` bytes from byte `at` on. Nothing is allocated before the members are known to hold them.
     pub(crate) fn read(&self, at: u64, count: u64) -> Result<Vec<u8>, Error> {
+        let length = self.check(at, count)?;
+        let mut bytes = vec![0; length];
+        self.fill(at, &mut bytes)?;
+        Ok(bytes)
+    }
+
+    /// Hands `count` bytes from byte `at` on to `take`, piece by piece, each a whole number of rows of `row` bytes.
+    pub(crate) fn pieces(&self, at: u64, count: u64, row: u64, mut take: impl FnMut(&[u8])) -> Result<(), Error> {
+        self.check(at, count)?;
+        let row = row.max(1);
+        let piece = (PIECE / row).max(1).saturating_mul(row).min(count);
+        let mut buffer = Vec::new();
+        let mut done = 0;
+        while done < count {
+            let here = piece.min(count - done);
+            if let Some(bytes) = self.borrowed(at + done, here)? {
+                take(bytes);
+            } else {
+                buffer.resize(here as usize, 0);
+                self.fill(at + done, &mut buffer)?;
+                take(&buffer);
+            }
+            done += here;
+        }
+        Ok(())
+    }
+
+    /// The bytes where they lie, if they are in memory and in one member.
+    fn borrowed(&self, at: u64, count: u64) -> Result<Option<&[u8]>, Error> {
+        let index = self.member_at(at);
+        let member = &self.members[index];
+        let bytes = match &self.source {
+            Source::Files(_) => return Ok(None),
+            Source::Maps(maps) => self.map(maps, index)?,
+            Source::Memory(files) => &files[index],
+        };
+        let start = usize::try_from(at - member.start).unwrap_or(usize::MAX);
+        Ok(start.checked_add(count as usize).and_then(|end| bytes.get(start..end)))
+    }
+
+    /// Whether the members hold these bytes; their number for an allocation.
+    fn check(&self, at: u64, count: u64) -> Result<usize, Error> {
         let fits = at.checked_add(count).is_some_and(|end| end <= self.total());
-        let Some(length) = usize::try_from(count).ok().filter(|_| fits) else {
+        usize::try_from(count).ok().filter(|_| fits).ok_or_else(|| {
             let (path, offset) = self.place(at);
             let left = self.total().saturating_sub(at);
-            return Err(Error::Truncated { path, section: "data", offset, need: count, left });
-        };
-        let mut bytes = vec![0; length];
+            Error::Truncated { path, section: "data", offset, need: count, left }
+        })
+    }
+
+    fn fill(&self, at: u64, into: &mut [u8]) -> Result<(), Error> {
         let mut filled = 0;
-        while filled < length {
+        while filled < into.len() {
             let from = at + filled as u64;
             let index = self.member_at(from);
             let member = &self.members[index];
-            let here = (member.end() - from).min((length - filled) as u64) as usize;
-            self.read_member(index, from - member.start, &mut bytes[filled..filled + here])?;
+            let here = (member.end() - from).min((into.len() - filled) as u64) as usize;
+            self.read_member(index, from - member.start, &mut into[filled..filled + here])?;
             filled += here;
         }
-        Ok(bytes)
+        Ok(())
     }
 
     fn read_member(&self, index: usize, offset: u64, into: &mut [u8]) -> Result<(), Error> {
         let member = &self.members[index];
-        let file = self.open(index)?;
+        let bytes = match &self.source {
+            Source::Files(latest) => return self.read_file(latest, index, offset, into),
+            Source::Maps(maps) => self.map(maps, index)?,
+            Source::Memory(files) => &files[index],
+        };
+        let start = usize::try_from(offset).unwrap_or(usize::MAX);
+        match start.checked_add(into.len()).and_then(|end| bytes.get(start..end)) {
+            Some(bytes) => into.copy_from_slice(bytes),
+            None => {
+                let (path, found) = (member.path.clone(), bytes.len() as u64);
+                return Err(Error::Changed { path, expected: member.bytes, found });
+            }
+        }
+        Ok(())
+    }
+
+    fn read_file(&self, latest: &Latest, index: usize, offset: u64, into: &mut [u8]) -> Result<(), Error> {
+        let member = &self.members[index];
+        let file = self.open(latest, index)?;
         let mut filled = 0;
         while filled < into.len() {
             match read_at(&file, &mut into[filled..], offset + filled as u64) {
@@ -164,8 +243,8 @@ impl Stream {
     }
 
     /// Only the file read last stays open: families of a thousand members would use up the file handles.
-    fn open(&self, index: usize) -> Result<Arc<File>, Error> {
-        let mut latest = self.latest.lock().unwrap_or_else(PoisonError::into_inner);
+    fn open(&self, latest: &Latest, index: usize) -> Result<Arc<File>, Error> {
+        let mut latest = latest.lock().unwrap_or_else(PoisonError::into_inner);
         match &*latest {
             Some((open, file)) if *open == index => Ok(Arc::clone(file)),
             _ => {
@@ -176,6 +255,36 @@ impl Stream {
             }
         }
     }
+
+    /// The bytes of a member that is mapped; they may be fewer than there were when the family was opened.
+    fn map<'a>(&self, maps: &'a [OnceLock<Map>], index: usize) -> Result<&'a [u8], Error> {
+        let map = match maps[index].get() {
+            Some(map) => map,
+            None => {
+                let path = &self.members[index].path;
+                let map = Map::of(path).map_err(Error::io(path, "mapping"))?;
+                maps[index].get_or_init(|| map)
+            }
+        };
+        Ok(map.bytes())
+    }
+}
+
+/// The file read last, with its place among the members.
+type Latest = Mutex<Option<(usize, Arc<File>)>>;
+
+/// The members one after the other in the stream; tells about numbers that are missing.
+fn in_a_row(found: Vec<(u32, PathBuf, u64)>, warnings: &mut Vec<Warning>) -> Vec<MemberFile> {
+    let mut members: Vec<MemberFile> = Vec::with_capacity(found.len());
+    for (number, path, bytes) in found {
+        let start = members.last().map_or(0, MemberFile::end);
+        if let Some(last) = members.last().filter(|last| number > last.number + 1) {
+            let count = number - last.number - 1;
+            warnings.push(Warning::MissingMembers { after: last.path.clone(), before: path.clone(), count });
+        }
+        members.push(MemberFile { path, number, start, bytes });
+    }
+    members
 }
 
 #[cfg(unix)]
@@ -198,12 +307,20 @@ fn read_at(mut file: &File, into: &mut [u8], offset: u64) -> std::io::Result<usi
     file.read(into)
 }
 
-/// The first bytes of a file, at most `count`.
+/// The first bytes of a file, at most `count`. One read where the file has them: a folder may hold thousands.
 pub(crate) fn read_head(path: &Path, count: u64) -> Result<Vec<u8>, Error> {
-    use std::io::Read;
     let file = File::open(path).map_err(Error::io(path, "opening"))?;
-    let mut head = Vec::new();
-    file.take(count).read_to_end(&mut head).map_err(Error::io(path, "reading"))?;
+    let mut head = vec![0; count as usize];
+    let mut filled = 0;
+    while filled < head.len() {
+        match read_at(&file, &mut head[filled..], filled as u64) {
+            Ok(0) => break,
+            Ok(count) => filled += count,
+            Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(Error::io(path, "reading")(error)),
+        }
+    }
+    head.truncate(filled);
     Ok(head)
 }
 
@@ -226,7 +343,7 @@ pub(crate) fn files_in(folder: &Path, wanted: impl Fn(&[u8]) -> bool) -> Result<
 }
 
 /// The folder of a file, for listing.
-fn folder_of(path: &Path) -> &Path {
+pub(crate) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 

@@ -3,10 +3,12 @@
 //! Its kinds stand in an order of their own: solids, beams, shells, thick shells.
 
 use crate::control::Control;
-use crate::cursor::Cursor;
+use crate::cursor::{Cursor, Section};
 use crate::error::Error;
+use crate::words::Words;
 
-/// User numbers of everything that has one; 1, 2, 3 … where the file has none.
+/// User numbers of everything that has one; empty lists where the file has none.
+#[derive(Default)]
 pub(crate) struct Numbers {
     /// Whether the section repeats the counts of the control block, or there is no section.
     pub(crate) agree: bool,
@@ -20,55 +22,80 @@ pub(crate) struct Numbers {
 }
 
 /// Words of the header, without and with the six words on parts.
-const SHORT_HEADER: usize = 10;
-const LONG_HEADER: usize = 16;
+const SHORT_HEADER: u64 = 10;
+const LONG_HEADER: u64 = 16;
 
-/// Reads the section and leaves the cursor behind it, whatever its lists say.
-pub(crate) fn read_numbers(control: &Control, cursor: &mut Cursor) -> Result<Numbers, Error> {
-    let counts = [control.nodes, control.solids, control.beams, control.shells, control.thick_shells];
-    let in_sequence = |agree: bool| {
-        let [nodes, solids, beams, shells, thick_shells] = counts.map(|count| (1..=count).collect());
-        Numbers { agree, nodes, solids, beams, shells, thick_shells, parts: None }
-    };
+/// Reads the section and leaves the cursor behind it, whatever its lists say. Without `keep`, only the header.
+pub(crate) fn read_numbers(control: &Control, cursor: &mut Cursor, keep: bool) -> Result<Numbers, Error> {
     if control.narbs == 0 {
-        return Ok(in_sequence(true));
+        return Ok(Numbers { agree: true, ..Numbers::default() });
     }
     let words = if control.wide_numbers { control.words.wide() } else { control.words };
     let section = cursor.skip_bytes(control.narbs, words.size(), "user numbers")?;
-    let bytes = cursor.bytes_of(section)?;
-    let numbers: Vec<i64> = words.ints(&bytes).collect();
-    drop(bytes);
-    Ok(split(&numbers, counts, words.size() == 4).unwrap_or_else(|| in_sequence(false)))
+    let mut lists = Lists { cursor, words, section, at: 0, single: words.size() == 4 };
+    let counts = [control.nodes, control.solids, control.beams, control.shells, control.thick_shells];
+    Ok(split(&mut lists, counts, keep)?.unwrap_or_default())
 }
 
 /// Takes the lists apart; `None` if the header does not repeat the counts or a list is cut off.
-fn split(numbers: &[i64], counts: [u64; 5], single: bool) -> Option<Numbers> {
-    let repeated = numbers.get(5..SHORT_HEADER)?;
-    if !counts.iter().zip(repeated).all(|(&count, &word)| u64::try_from(word) == Ok(count)) {
-        return None;
+fn split(lists: &mut Lists, counts: [u64; 5], keep: bool) -> Result<Option<Numbers>, Error> {
+    let Some(header) = lists.next(SHORT_HEADER, |word| word)? else { return Ok(None) };
+    if !counts.iter().zip(&header[5..]).all(|(&count, &word)| u64::try_from(word) == Ok(count)) {
+        return Ok(None);
     }
     // NSORT < 0: parts have numbers of their own
-    let long = numbers[0] < 0;
-    let mut rest = numbers.get(if long { LONG_HEADER } else { SHORT_HEADER }..)?;
-    let mut next = |count: u64| {
-        let (list, behind) = rest.split_at_checked(usize::try_from(count).ok()?)?;
-        rest = behind;
-        Some(list.iter().map(|&number| user_number(number, single)).collect::<Vec<u64>>())
+    let on_parts = match header[0] < 0 {
+        true => lists.next(LONG_HEADER - SHORT_HEADER, |word| word)?,
+        false => Some(Vec::new()),
     };
-    let [nodes, solids, beams, shells, thick_shells] = counts.map(&mut next);
-    let parts = match long {
-        true => u64::try_from(numbers[15]).ok().and_then(|count| Some(by_internal_order(next(count)?, next(count)))),
-        false => None,
+    let Some(on_parts) = on_parts else { return Ok(None) };
+    if !keep {
+        return Ok(Some(Numbers { agree: true, ..Numbers::default() }));
+    }
+    let mut read = [const { Vec::new() }; 5];
+    for (list, count) in read.iter_mut().zip(counts) {
+        let Some(numbers) = lists.numbers(count)? else { return Ok(None) };
+        *list = numbers;
+    }
+    let [nodes, solids, beams, shells, thick_shells] = read;
+    let parts = match on_parts.last().map(|&count| u64::try_from(count).unwrap_or(u64::MAX)) {
+        None => None,
+        Some(count) => match (lists.numbers(count)?, lists.numbers(count)?) {
+            (Some(first), second) => Some(by_internal_order(first, second)),
+            (None, _) => None,
+        },
     };
-    Some(Numbers {
-        agree: true,
-        nodes: nodes?,
-        solids: solids?,
-        beams: beams?,
-        shells: shells?,
-        thick_shells: thick_shells?,
-        parts,
-    })
+    Ok(Some(Numbers { agree: true, nodes, solids, beams, shells, thick_shells, parts }))
+}
+
+/// The lists of the section, one after the other.
+struct Lists<'a, 'b> {
+    cursor: &'a Cursor<'b>,
+    words: Words,
+    section: Section,
+    /// Bytes of the section that are passed.
+    at: u64,
+    single: bool,
+}
+
+impl Lists<'_, '_> {
+    /// The next `count` words; `None` if the section does not have them.
+    fn next<T>(&mut self, count: u64, convert: impl Fn(i64) -> T) -> Result<Option<Vec<T>>, Error> {
+        let size = self.words.size();
+        let Some(bytes) = count.checked_mul(size).filter(|&bytes| bytes <= self.section.bytes - self.at) else {
+            return Ok(None);
+        };
+        let section = Section { start: self.section.start + self.at, bytes, ..self.section };
+        self.at += bytes;
+        let mut list = Vec::with_capacity(count as usize);
+        self.cursor.pieces(section, size, |piece| list.extend(self.words.ints(piece).map(&convert)))?;
+        Ok(Some(list))
+    }
+
+    fn numbers(&mut self, count: u64) -> Result<Option<Vec<u64>>, Error> {
+        let single = self.single;
+        self.next(count, |word| user_number(word, single))
+    }
 }
 
 /// Two lists name the parts: one sorted, for looking numbers up, and one in internal order, by which elements name their

@@ -4,7 +4,9 @@ use std::collections::{BTreeSet, HashMap};
 
 use crate::control::Control;
 use crate::elements::Geometry;
+use crate::error::Error;
 use crate::geometry::Reading;
+use crate::members::Stream;
 use crate::titles::Titles;
 use crate::warning::Warning;
 use crate::words::{decode_text, trim_end};
@@ -19,6 +21,9 @@ pub struct Part {
     pub title: String,
     /// The title as it is in the file, in whatever encoding the pre-processor used, without blanks at its end.
     pub title_bytes: Vec<u8>,
+    /// Number of its material model in the solver (20 is rigid), where the file tells: only files that leave the results
+    /// of rigid shells out do (NDIM 5, 7).
+    pub material: Option<u64>,
     /// Solids in it.
     pub solids: usize,
     /// Thick shells in it.
@@ -32,6 +37,11 @@ pub struct Part {
 }
 
 impl Part {
+    /// A part for a family that is to be written: its number in the deck and its title, of which the file keeps 72 bytes.
+    pub fn new(id: u64, title: &str) -> Part {
+        Part { id, title: title.to_owned(), title_bytes: title.as_bytes().to_vec(), ..Part::default() }
+    }
+
     /// Whether any element belongs to it. Nodal rigid bodies and parts left out of the output do not have any.
     pub fn is_used(&self) -> bool {
         self.solids + self.thick_shells + self.beams + self.shells + self.sph > 0
@@ -44,10 +54,20 @@ pub(crate) fn assemble(
     control: &Control,
     reading: &mut Reading,
     titles: &Titles,
+    stream: &Stream,
     warnings: &mut Vec<Warning>,
-) -> Vec<Part> {
+) -> Result<Vec<Part>, Error> {
     let counted = control.parts as usize;
-    add_missing(&mut reading.geometry, counted, warnings);
+    let added = add_missing(&mut reading.geometry, counted, warnings);
+    if (counted + added) as u64 > control.most_parts {
+        return Err(Error::Geometry {
+            path: stream.root().to_owned(),
+            section: "parts of the elements",
+            offset: 0,
+            found: format!("{added} parts beyond the {counted} of the control block"),
+            expected: format!("at most {}, for files of this size,", control.most_parts),
+        });
+    }
     let ids = reading.part_ids.as_deref().unwrap_or_default();
     let most = part_indices(&mut reading.geometry).map(|part| *part as usize + 1).max().unwrap_or(0);
     let mut parts: Vec<Part> = (0..counted.max(most))
@@ -61,6 +81,7 @@ pub(crate) fn assemble(
         let title = if by_place { Some(titles.parts[index].1.as_slice()) } else { by_id.get(&part.id).copied() };
         part.title_bytes = trim_end(title.unwrap_or_default()).to_vec();
         part.title = decode_text(&part.title_bytes);
+        part.material = reading.material_types.get(index).and_then(|&number| u64::try_from(number).ok());
     }
 
     let geometry = &reading.geometry;
@@ -69,16 +90,16 @@ pub(crate) fn assemble(
     geometry.beams.iter().for_each(|beam| parts[beam.part as usize].beams += 1);
     geometry.shells.iter().for_each(|shell| parts[shell.part as usize].shells += 1);
     geometry.sph.iter().for_each(|particle| parts[particle.part as usize].sph += 1);
-    parts
+    Ok(parts)
 }
 
 /// A part number is a word of the file and may be anything up to 2³²: the numbers beyond the count become the next
 /// free places, so that no list is as long as such a number.
-fn add_missing(geometry: &mut Geometry, counted: usize, warnings: &mut Vec<Warning>) {
+fn add_missing(geometry: &mut Geometry, counted: usize, warnings: &mut Vec<Warning>) -> usize {
     let beyond: BTreeSet<u32> =
         part_indices(geometry).map(|part| *part).filter(|&part| part as usize >= counted).collect();
     if beyond.is_empty() {
-        return;
+        return 0;
     }
     let places: HashMap<u32, u32> = beyond.iter().copied().zip(counted as u32..).collect();
     for part in part_indices(geometry) {
@@ -87,6 +108,7 @@ fn add_missing(geometry: &mut Geometry, counted: usize, warnings: &mut Vec<Warni
         }
     }
     warnings.push(Warning::PartsBeyondCount { count: beyond.len() });
+    beyond.len()
 }
 
 /// The part of every element of every kind.

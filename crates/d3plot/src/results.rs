@@ -3,8 +3,6 @@
 
 use crate::error::Error;
 use crate::family::Family;
-use crate::geometry::points;
-use crate::state::Field;
 
 /// A table of a state: row after row.
 #[derive(Debug, Clone, PartialEq)]
@@ -49,18 +47,7 @@ impl Family {
     /// # Errors
     /// [`Error::NoSuchState`], [`Error::Changed`], [`Error::Io`]: as every read of a state.
     pub fn coordinates(&self, state: usize) -> Result<Option<Vec<[f64; 3]>>, Error> {
-        if let Some(positions) = self.vectors(state, "coordinates")? {
-            return Ok(Some(positions));
-        }
-        let Some(mut positions) = self.vectors(state, "displacement")? else {
-            return Ok(None);
-        };
-        for (position, start) in positions.iter_mut().zip(&self.geometry().coordinates) {
-            for (moved, initial) in position.iter_mut().zip(start) {
-                *moved += initial;
-            }
-        }
-        Ok(Some(positions))
+        self.vectors(state, "coordinates")
     }
 
     /// Velocities of the nodes, N × 3 in length per time of the file's units; `None` if the states have none.
@@ -89,8 +76,9 @@ impl Family {
         Ok(table.map(|table| table.rows().map(|row| row[0]).collect()))
     }
 
-    /// A table of [`Family::fields`] as it is in the file: rows × columns. For what has no function of its own, such as
-    /// stresses and histories. `None` if the states have no field of that name. Rigid shells have no row in `shell`.
+    /// A table of a state as it is in the file: rows × columns, every word. For what has no name of its own; other fields
+    /// are to be had by [`Family::values`]. `None` if the states have no table of that name. Rigid shells have no row in
+    /// `shell`, nodes of rigid bodies none in `coordinates` where the states leave them out.
     ///
     /// # Errors
     /// As [`Family::coordinates`].
@@ -99,8 +87,13 @@ impl Family {
         let Some(field) = self.layout.field(field) else {
             return Ok(None);
         };
-        let bytes = self.bytes_of(start, field)?;
-        Ok(Some(Table { values: self.control.words.floats(&bytes).collect(), columns: field.columns as usize }))
+        let words = self.control.words;
+        let row = field.columns * words.size();
+        let mut values = Vec::with_capacity((field.rows * field.columns) as usize);
+        self.stream.pieces(start + field.offset * words.size(), field.rows * row, row, |bytes| {
+            values.extend(words.floats(bytes));
+        })?;
+        Ok(Some(Table { values, columns: field.columns as usize }))
     }
 
     /// Which elements are deleted in a state; `None` if the states hold no deletion table.
@@ -145,27 +138,13 @@ impl Family {
         })
     }
 
-    /// The bytes of a field of the state that starts at byte `start`.
-    pub(crate) fn bytes_of(&self, start: u64, field: &Field) -> Result<Vec<u8>, Error> {
-        let size = self.control.words.size();
-        self.stream.read(start + field.offset * size, field.rows * field.columns * size)
-    }
-
-    /// A block of vectors; nodes that the block leaves out are NaN.
+    /// A field of vectors; plane models have no z.
     fn vectors(&self, state: usize, field: &str) -> Result<Option<Vec<[f64; 3]>>, Error> {
-        let start = self.start(state)?;
-        let Some(field) = self.layout.field(field) else {
-            return Ok(None);
-        };
-        let vectors = points(&self.control, &self.bytes_of(start, field)?);
-        let Some(active) = self.reading.active.as_ref().filter(|_| field.rows != self.control.nodes) else {
-            return Ok(Some(vectors));
-        };
-        let mut all = vec![[f64::NAN; 3]; self.geometry().coordinates.len()];
-        for (&node, vector) in active.iter().zip(vectors) {
-            all[node as usize] = vector;
-        }
-        Ok(Some(all))
+        let Some(table) = self.values(state, field)? else { return Ok(None) };
+        Ok(Some(match table.columns {
+            3 => table.values.as_chunks().0.to_vec(),
+            _ => table.rows().map(|row| [row[0], row.get(1).copied().unwrap_or(0.0), 0.0]).collect(),
+        }))
     }
 
     /// One flag a shell: without words in the states.

@@ -6,7 +6,7 @@
 use crate::control::Control;
 use crate::geometry::Reading;
 
-/// A table in every state: one row a thing, so many words a row. The names, in the order of the file:
+/// A field of every state: one row a thing, so many words a row. The tables, in the order of the file:
 ///
 /// - of the state: `time`, `globals`;
 /// - of nodes: `coordinates` or `displacement`, `temperature`, `heat_flux`, `mass_scaling`, `temperature_rate`,
@@ -16,7 +16,18 @@ use crate::geometry::Reading;
 /// - the rest: `node_deletion` or `element_deletion` (0 = deleted; elements in the order solids, thick shells, shells,
 ///   beams), `sph`, `airbag`, `airbag_particle`, `road`, `rigid_motion`.
 ///
-/// Units are those of the run; the file does not tell them.
+/// Quantities are taken out of the tables of elements; their columns are points × components:
+///
+/// - `shell_stress`, `shell_plastic_strain`, `shell_history`, `shell_bending_moment`, `shell_shear_force`,
+///   `shell_normal_force`, `shell_thickness`, `shell_element_variable`, `shell_strain` (6 inner, 6 outer),
+///   `shell_internal_energy`, `shell_plastic_strain_tensor`, `shell_thermal_strain`;
+/// - `thick_shell_stress`, `thick_shell_plastic_strain`, `thick_shell_history`, `thick_shell_strain`,
+///   `thick_shell_internal_energy`;
+/// - `solid_stress`, `solid_plastic_strain`, `solid_history`, `solid_strain`;
+/// - `beam_axial_force`, `beam_shear_force`, `beam_bending_moment`, `beam_torsion_moment`, and for each integration point
+///   `beam_shear_stress`, `beam_axial_stress`, `beam_plastic_strain`, `beam_axial_strain`.
+///
+/// Components of stress and strain: xx, yy, zz, xy, yz, zx. Units are those of the run; the file does not tell them.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Field {

@@ -191,7 +191,8 @@ fn part_titles(control: &Control, stream: &Stream, cursor: &mut Cursor, titles: 
     let there = count.min(cursor.left() / entry);
     let section = cursor.skip_bytes(there, entry, "part titles")?;
     let bytes = cursor.bytes_of(section)?;
-    for entry in bytes.chunks_exact(entry as usize) {
+    // titles of more parts than there can be are of no use
+    for entry in bytes.chunks_exact(entry as usize).take(control.most_parts as usize) {
         let (id, title) = entry.split_at(id_words.size() as usize);
         let id = id_words.ints(id).next().unwrap_or(0);
         let id = if id_words.size() == 4 { u64::from(id as u32) } else { id as u64 };

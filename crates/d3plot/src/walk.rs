@@ -13,6 +13,10 @@ use crate::words::Words;
 /// Bytes read at a time where one word is wanted and states are short.
 const WINDOW: u64 = 1 << 16;
 
+/// More states than a few are believed only if each has some results: what is kept of a state is then small beside it.
+const FEW_STATES: u64 = 1024;
+const BYTES_OF_A_STATE: u64 = 64;
+
 /// The states found with one length of a state.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Walk {
@@ -30,6 +34,11 @@ pub(crate) struct Walk {
 }
 
 impl Walk {
+    /// Whether most members speak for this length: then no other one can fit better.
+    pub(crate) fn is_settled(&self) -> bool {
+        self.doubtful == 0 || self.marked > self.doubtful
+    }
+
     /// Whether this length fits the members and `other` does not. Only marks count: a wrong length may well end at the
     /// last byte of a cut member, or in padding.
     pub(crate) fn fits_better_than(&self, other: &Walk) -> bool {
@@ -152,6 +161,10 @@ impl<'a> Walker<'a> {
                 let words_missing = (state - left).div_ceil(size);
                 walk.warnings.push(Warning::CutState { member: path, offset, time, words_missing });
                 return Ok(Stop::Cut);
+            }
+            if walk.starts.len() as u64 > FEW_STATES + self.stream.total() / BYTES_OF_A_STATE {
+                let what = format!("more than {} states of {state} bytes", walk.starts.len());
+                return Err(Error::Unsupported { path: self.stream.root().to_owned(), what });
             }
             walk.starts.push(*at);
             walk.times.push(time);

@@ -170,7 +170,10 @@ impl fmt::Display for Warning {
                 write!(f, "a state has {declared} words by the control block but {used} by the end marks: {reason}")
             }
             Warning::RigidNodes { count } => {
-                write!(f, "the states leave out {count} nodes of rigid bodies; their results are NaN")
+                write!(
+                    f,
+                    "the states leave out {count} nodes of rigid bodies: coordinates, velocity and acceleration of these are NaN, not rebuilt"
+                )
             }
             Warning::NoStates => f.write_str("the family has no whole state"),
         }

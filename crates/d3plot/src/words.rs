@@ -1,25 +1,27 @@
-//! Words of a d3plot: 4 or 8 bytes, little or big endian. The only place where bytes become numbers.
+//! Words of a d3plot: 4 or 8 bytes, little or big endian. The only place where bytes become numbers, and numbers bytes.
 
 /// The size of every word of a family, integers and floats alike.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Precision {
     /// 4-byte words.
+    #[default]
     Single,
     /// 8-byte words.
     Double,
 }
 
 /// Which byte of a word comes first.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum ByteOrder {
     /// Lowest byte first: what nearly every family of today has.
+    #[default]
     Little,
     /// Highest byte first: families of old workstations.
     Big,
 }
 
 /// How the words of one family are stored.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Words {
     pub(crate) precision: Precision,
     pub(crate) order: ByteOrder,
@@ -72,6 +74,40 @@ impl Words {
             (Precision::Single, ByteOrder::Big) => f32::from_be_bytes(array(word)).into(),
             (Precision::Double, ByteOrder::Little) => f64::from_le_bytes(array(word)),
             (Precision::Double, ByteOrder::Big) => f64::from_be_bytes(array(word)),
+        }
+    }
+}
+
+impl Words {
+    /// Adds an integer; beyond 32 bits a word of 4 bytes keeps the lower ones.
+    pub(crate) fn push_int(self, into: &mut Vec<u8>, value: i64) {
+        match (self.precision, self.order) {
+            (Precision::Single, ByteOrder::Little) => into.extend((value as i32).to_le_bytes()),
+            (Precision::Single, ByteOrder::Big) => into.extend((value as i32).to_be_bytes()),
+            (Precision::Double, ByteOrder::Little) => into.extend(value.to_le_bytes()),
+            (Precision::Double, ByteOrder::Big) => into.extend(value.to_be_bytes()),
+        }
+    }
+
+    /// Adds floats.
+    pub(crate) fn push_floats(self, into: &mut Vec<u8>, values: impl IntoIterator<Item = f64>) {
+        for value in values {
+            let mut word = [0; 8];
+            self.put_float(&mut word, value);
+            into.extend(&word[..self.size() as usize]);
+        }
+    }
+
+    /// Overwrites the first word of `word` with a float.
+    pub(crate) fn put_float(self, word: &mut [u8], value: f64) {
+        let bytes = match (self.precision, self.order) {
+            (Precision::Single, ByteOrder::Little) => &(value as f32).to_le_bytes()[..],
+            (Precision::Single, ByteOrder::Big) => &(value as f32).to_be_bytes()[..],
+            (Precision::Double, ByteOrder::Little) => &value.to_le_bytes()[..],
+            (Precision::Double, ByteOrder::Big) => &value.to_be_bytes()[..],
+        };
+        for (byte, value) in word.iter_mut().zip(bytes) {
+            *byte = *value;
         }
     }
 }

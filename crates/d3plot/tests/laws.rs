@@ -23,11 +23,18 @@ fn shapes_agree_with_the_header() {
     for family in all() {
         let (header, geometry) = (family.header(), family.geometry());
         assert_eq!(geometry.coordinates.len(), header.nodes);
-        assert_eq!(geometry.node_ids.len(), header.nodes);
-        assert_eq!((geometry.shells.len(), geometry.shell_ids.len()), (header.shells, header.shells));
-        assert_eq!((geometry.solids.len(), geometry.solid_ids.len()), (header.solids, header.solids));
-        assert_eq!(geometry.thick_shells.len(), geometry.thick_shell_ids.len());
-        assert_eq!(geometry.beams.len(), geometry.beam_ids.len());
+        assert_eq!((geometry.shells.len(), geometry.solids.len()), (header.shells, header.solids));
+        // all have user numbers, or none
+        let numbered = !geometry.node_ids.is_empty();
+        for (ids, count) in [
+            (&geometry.node_ids, header.nodes),
+            (&geometry.shell_ids, header.shells),
+            (&geometry.solid_ids, header.solids),
+            (&geometry.thick_shell_ids, header.thick_shells),
+            (&geometry.beam_ids, header.beams),
+        ] {
+            assert_eq!(ids.len(), if numbered { count } else { 0 });
+        }
         let elements = header.solids + header.thick_shells + header.beams + header.shells + header.sph;
         let counted: usize = family
             .parts()

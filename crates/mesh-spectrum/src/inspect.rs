@@ -1,10 +1,24 @@
 //! What a mesh is like before anything is computed on it: how large, how many pieces, which defects.
 //!
 //! A caller shows this to the user, who decides with it whether pieces should be joined
-//! ([`join`](crate::join)) and whether the mesh is the one meant.
+//! ([`join`](crate::join)), which operator suits the mesh, and whether the mesh is the one meant.
+
+use std::fmt;
 
 use crate::mesh::{Mesh, Union, double_area, norm, sub};
+use crate::operator::{Kind, cotangents};
 use crate::proximity::mutual_pairs;
+use crate::split::angle;
+
+/// Triangles with a smaller angle than this (1°) are thin: the largest eigenvalue, and with it rounding, grows as its
+/// reciprocal.
+const THIN: f64 = 1.0 * DEGREE;
+
+/// Triangles with a larger angle than this (170°) are flat: linear elements lose accuracy with the largest angle
+/// (Babuška and Aziz 1976), not with the smallest.
+const FLAT: f64 = 170.0 * DEGREE;
+
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
 /// Size, components and defects of a mesh. Lengths in the model's length unit ℓ, areas in ℓ².
 #[derive(Debug, Clone, PartialEq)]
@@ -22,6 +36,13 @@ pub struct Inspection {
     pub triangles_without_area: usize,
     /// Edges with more than two triangles, such as T-joints. The operator sums over all of them.
     pub non_manifold_edges: usize,
+    /// Edges whose weight in the cotangent operator is negative: the angles opposite to them add up to more than half a
+    /// turn. With them a field can have a maximum inside of the mesh that its boundary does not have.
+    pub negative_edges: usize,
+    /// The smallest angle of the triangles with area, in radians.
+    pub angle_min: f64,
+    /// The largest, in radians.
+    pub angle_max: f64,
     /// Vertices of no triangle. The operator refuses a mesh that has them.
     pub unused_vertices: usize,
     /// Faces with fewer than three different vertices, left out when the mesh was made.
@@ -36,6 +57,73 @@ pub struct Inspection {
     /// The distance to [`join`](crate::join) at if the components belong together: a quarter more than `gap_median`,
     /// because sheets are not perfectly parallel, rounded up to two significant digits, ℓ.
     pub gap: Option<f64>,
+    /// What speaks for [`Kind::Tufted`] on this mesh; nothing where [`Kind::Cotan`] serves as well.
+    pub reasons: Vec<Reason>,
+}
+
+impl Inspection {
+    /// The operator that suits the mesh.
+    pub fn recommended(&self) -> Kind {
+        if self.reasons.is_empty() { Kind::Cotan } else { Kind::Tufted }
+    }
+}
+
+/// What speaks for the tufted operator. Places are the first ones; triangles are numbered from 0.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Reason {
+    /// Edges with more than two faces.
+    NonManifold {
+        /// How many.
+        edges: usize,
+        /// The vertices of the first.
+        first: [u32; 2],
+    },
+    /// Triangles with an angle below 1° or above 170°.
+    BadShape {
+        /// How many.
+        triangles: usize,
+        /// The worst.
+        worst: u32,
+        /// Its smallest angle, in degrees.
+        angle: f64,
+    },
+    /// Triangles without area, which the cotangent operator leaves out.
+    WithoutArea {
+        /// How many.
+        triangles: usize,
+        /// The first.
+        first: u32,
+    },
+    /// Triangles that are there twice, which the cotangent operator counts twice.
+    Duplicates {
+        /// How many.
+        triangles: usize,
+        /// The first that repeats another.
+        first: u32,
+    },
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Reason::NonManifold { edges, first: [a, b] } => {
+                write!(f, "{edges} edges have more than two faces, the first between vertices {a} and {b}")
+            }
+            Reason::BadShape { triangles, worst, angle } => {
+                write!(
+                    f,
+                    "{triangles} triangles are badly shaped, the worst is triangle {worst} with an angle of {angle:.2}°"
+                )
+            }
+            Reason::WithoutArea { triangles, first } => {
+                write!(f, "{triangles} triangles have no area, the first is triangle {first}")
+            }
+            Reason::Duplicates { triangles, first } => {
+                write!(f, "{triangles} triangles repeat another one, the first is triangle {first}")
+            }
+        }
+    }
 }
 
 /// Looks a mesh over. Takes O(T log T) time.
@@ -47,9 +135,24 @@ pub fn inspect(mesh: &Mesh) -> Inspection {
     let mut used = vec![false; vertices.len()];
     mesh.triangles().iter().flatten().for_each(|&vertex| used[vertex as usize] = true);
 
+    let shape = shape(mesh, &areas);
     let length = |[a, b]: [u32; 2]| norm(sub(vertices[a as usize], vertices[b as usize]));
-    let edges = edges(mesh);
-    let edge_length_mean = edges.iter().map(|(edge, _)| length(*edge)).sum::<f64>() / edges.len().max(1) as f64;
+    let edges = edges(mesh, &areas);
+    let edge_length_mean = edges.iter().map(|edge| length(edge.ends)).sum::<f64>() / edges.len().max(1) as f64;
+    let triangles_without_area = areas.iter().filter(|area| area.is_none()).count();
+    let non_manifold: Vec<&Edge> = edges.iter().filter(|edge| edge.faces > 2).collect();
+    let mut reasons = Vec::new();
+    if let Some(edge) = non_manifold.first() {
+        reasons.push(Reason::NonManifold { edges: non_manifold.len(), first: edge.ends });
+    }
+    if let Some(worst) = shape.worst {
+        let angle = shape.angle_min / DEGREE;
+        reasons.push(Reason::BadShape { triangles: shape.bad, worst, angle });
+    }
+    if let Some(first) = areas.iter().position(Option::is_none) {
+        reasons.push(Reason::WithoutArea { triangles: triangles_without_area, first: first as u32 });
+    }
+    reasons.extend(duplicates(mesh));
 
     let gap_median = (components > 1 && edge_length_mean > 0.0)
         .then(|| mutual_pairs(vertices, &component_of_vertex, 0.5 * edge_length_mean))
@@ -61,17 +164,21 @@ pub fn inspect(mesh: &Mesh) -> Inspection {
 
     Inspection {
         area: 0.5 * areas.iter().flatten().sum::<f64>(),
-        boundary_length: edges.iter().filter(|(_, faces)| *faces == 1).map(|(edge, _)| length(*edge)).sum(),
+        boundary_length: edges.iter().filter(|edge| edge.faces == 1).map(|edge| length(edge.ends)).sum(),
         components,
         component_of_vertex,
-        triangles_without_area: areas.iter().filter(|area| area.is_none()).count(),
-        non_manifold_edges: edges.iter().filter(|(_, faces)| *faces > 2).count(),
+        triangles_without_area,
+        non_manifold_edges: non_manifold.len(),
+        negative_edges: edges.iter().filter(|edge| edge.weight < -1e-12).count(),
+        angle_min: shape.angle_min,
+        angle_max: shape.angle_max,
         unused_vertices: used.iter().filter(|used| !**used).count(),
         faces_left_out: mesh.faces_left_out(),
         edge_length_mean,
         edge_length_max: longest_edge(mesh),
         gap_median,
         gap: gap_median.map(|median| round_up(1.25 * median, edge_length_mean)),
+        reasons,
     }
 }
 
@@ -90,18 +197,74 @@ pub(crate) fn longest_edge(mesh: &Mesh) -> f64 {
     mesh.triangles().iter().map(|&t| longest(mesh.corners(t))).fold(0.0, f64::max)
 }
 
-/// Every different edge, lower vertex first, with its number of triangles.
-fn edges(mesh: &Mesh) -> Vec<([u32; 2], usize)> {
-    let mut all: Vec<[u32; 2]> = Vec::with_capacity(3 * mesh.triangles().len());
-    for &[a, b, c] in mesh.triangles() {
-        for [p, q] in [[a, b], [b, c], [c, a]] {
+/// An edge, lower vertex first, its number of triangles, and the sum of half the cotangents opposite to it.
+struct Edge {
+    ends: [u32; 2],
+    faces: usize,
+    weight: f64,
+}
+
+/// Every different edge, ascending.
+fn edges(mesh: &Mesh, areas: &[Option<f64>]) -> Vec<Edge> {
+    let mut all: Vec<([u32; 2], f64)> = Vec::with_capacity(3 * mesh.triangles().len());
+    for (&[a, b, c], area) in mesh.triangles().iter().zip(areas) {
+        let cot = area.map_or([0.0; 3], |area| cotangents(mesh.corners([a, b, c]), area));
+        for (k, [p, q]) in [[b, c], [c, a], [a, b]].into_iter().enumerate() {
             if p != q {
-                all.push([p.min(q), p.max(q)]);
+                all.push(([p.min(q), p.max(q)], 0.5 * cot[k]));
             }
         }
     }
+    all.sort_unstable_by_key(|edge| edge.0);
+    let merged = |same: &[([u32; 2], f64)]| Edge {
+        ends: same[0].0,
+        faces: same.len(),
+        weight: same.iter().map(|edge| edge.1).sum(),
+    };
+    all.chunk_by(|a, b| a.0 == b.0).map(merged).collect()
+}
+
+/// Angles of the triangles with area.
+struct Shape {
+    angle_min: f64,
+    angle_max: f64,
+    bad: usize,
+    /// Of those that are bad, the one with the smallest angle.
+    worst: Option<u32>,
+}
+
+fn shape(mesh: &Mesh, areas: &[Option<f64>]) -> Shape {
+    let mut shape = Shape { angle_min: f64::INFINITY, angle_max: 0.0, bad: 0, worst: None };
+    for ((number, &triangle), area) in (0..).zip(mesh.triangles()).zip(areas) {
+        if area.is_none() {
+            continue;
+        }
+        let [a, b, c] = mesh.corners(triangle);
+        let angles = [angle(a, b, c), angle(b, c, a), angle(c, a, b)];
+        let (least, most) = (angles.into_iter().fold(f64::INFINITY, f64::min), angles.into_iter().fold(0.0, f64::max));
+        if least < THIN || most > FLAT {
+            shape.bad += 1;
+            if shape.worst.is_none() || least < shape.angle_min {
+                shape.worst = Some(number);
+            }
+        }
+        shape.angle_min = shape.angle_min.min(least);
+        shape.angle_max = shape.angle_max.max(most);
+    }
+    shape.angle_min = shape.angle_min.min(shape.angle_max); // 0 without any triangle
+    shape
+}
+
+/// Triangles with the same three vertices as one before, whichever way round.
+fn duplicates(mesh: &Mesh) -> Option<Reason> {
+    let key = |mut triangle: [u32; 3]| {
+        triangle.sort_unstable();
+        triangle
+    };
+    let mut all: Vec<([u32; 3], u32)> = mesh.triangles().iter().zip(0..).map(|(&t, number)| (key(t), number)).collect();
     all.sort_unstable();
-    all.chunk_by(|a, b| a == b).map(|same| (same[0], same.len())).collect()
+    let again = || all.windows(2).filter(|pair| pair[0].0 == pair[1].0).map(|pair| pair[1].1);
+    again().min().map(|first| Reason::Duplicates { triangles: again().count(), first })
 }
 
 /// The next number of two significant digits at or above `x`. Vertices that coincide (x = 0) are joined at a
@@ -131,6 +294,22 @@ mod tests {
         // One triangle's boundary is 20 + 10√2; the other has its edge 4-5 three times (twice from the flat triangle).
         assert!((seen.boundary_length - (20.0 + 200f64.sqrt()) - (10.0 + 200f64.sqrt())).abs() < 1e-12);
         assert_eq!((seen.gap_median, seen.gap), (Some(2.0), Some(2.5)));
+        assert_eq!(seen.reasons[1], Reason::WithoutArea { triangles: 1, first: 2 });
+        assert!((seen.angle_max / DEGREE - 90.0).abs() < 1e-12 && (seen.angle_min / DEGREE - 45.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_speaks_for_another_operator() {
+        let square = vec![[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.5, -1e-3, 0.0]];
+        let good = inspect(&Mesh::new(square[..4].to_vec(), vec![[0, 1, 2], [0, 2, 3]]).unwrap());
+        assert_eq!((good.recommended(), good.negative_edges), (Kind::Cotan, 0));
+        let bad = inspect(&Mesh::new(square, vec![[0, 1, 2], [0, 2, 3], [0, 4, 1], [2, 0, 1], [3, 0, 2]]).unwrap());
+        assert_eq!(bad.recommended(), Kind::Tufted);
+        assert_eq!(bad.negative_edges, 1, "the one opposite to the flat corner");
+        let words: Vec<String> = bad.reasons.iter().map(Reason::to_string).collect();
+        assert_eq!(words[0], "2 edges have more than two faces, the first between vertices 0 and 1");
+        assert_eq!(words[1], "1 triangles are badly shaped, the worst is triangle 2 with an angle of 0.11°");
+        assert_eq!(words[2], "2 triangles repeat another one, the first is triangle 3");
     }
 
     #[test]

@@ -1,12 +1,13 @@
 //! Joining components that belong together but share no vertices, such as spot-welded sheets.
 //!
-//! Mutually nearest vertices of different components become one degree of freedom: the field takes one value on
+//! Ties by what a model says are the general case ([`Tie`](crate::Tie)). Mutually nearest vertices of different components become one degree of freedom: the field takes one value on
 //! both, so the spectrum is that of one connected surface. The geometry is not moved and no area is lost.
 
 use thiserror::Error;
 
+use crate::coupling::{Reduction, Tie};
 use crate::inspect::{components, longest_edge};
-use crate::mesh::{Mesh, Union};
+use crate::mesh::Mesh;
 use crate::proximity::mutual_pairs;
 
 /// Which vertices share a degree of freedom.
@@ -49,6 +50,17 @@ pub enum JoinError {
 /// A distance that is not a positive length, or more than ten times the longest edge (vertices that far apart do not
 /// name the same place, and the search would take the square of their number).
 pub fn join(mesh: &Mesh, distance: f64) -> Result<Join, JoinError> {
+    let ties = ties_of(mesh, distance)?;
+    // Vertices of the mesh with one weight each: never refused.
+    let reduction = Reduction::new(mesh.vertices().len(), &ties).unwrap_or_else(|error| unreachable!("{error}"));
+    Ok(Join { dof_of_vertex: reduction.dof_of_vertex, dofs: reduction.dofs, pairs: ties.len() })
+}
+
+/// The pairs of [`join`] as ties: the higher vertex of each has the value of the lower one.
+///
+/// # Errors
+/// As [`join`].
+pub fn ties_of(mesh: &Mesh, distance: f64) -> Result<Vec<Tie>, JoinError> {
     if !(distance > 0.0 && distance.is_finite()) {
         return Err(JoinError::Distance { distance });
     }
@@ -58,12 +70,7 @@ pub fn join(mesh: &Mesh, distance: f64) -> Result<Join, JoinError> {
     }
     let (component_of_vertex, _) = components(mesh);
     let pairs = mutual_pairs(mesh.vertices(), &component_of_vertex, distance);
-    let mut union = Union::new(mesh.vertices().len());
-    for pair in &pairs {
-        union.merge(pair.low, pair.high);
-    }
-    let (dof_of_vertex, dofs) = union.classes();
-    Ok(Join { dof_of_vertex, dofs, pairs: pairs.len() })
+    Ok(pairs.iter().map(|pair| Tie { vertex: pair.high, to: vec![(pair.low, 1.0)] }).collect())
 }
 
 #[cfg(test)]

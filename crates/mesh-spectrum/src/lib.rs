@@ -4,6 +4,9 @@
 //! [`operator`] builds stiffness and mass, with separate sheets [joined](join()) where asked for; [`eigenbasis`] finds the
 //! K lowest pairs of L φ = λ M φ and the evidence that they are right and that none is missing.
 //!
+//! `examples/obj_to_eigenpairs.rs` starts from a mesh file and prints pairs with their residuals. Quadrilaterals and
+//! non-manifold or badly shaped meshes have operators of their own, see [`Kind`]; [`inspect`] recommends one.
+//!
 //! The spectrum of a sheet of 2 × 1 with a free boundary is λ = π² (p²/4 + q²):
 //!
 //! ```
@@ -29,15 +32,22 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod coupling;
+mod csr;
 mod eigen;
 mod inspect;
 mod join;
 mod mesh;
 mod operator;
 mod proximity;
+mod split;
 
-pub use eigen::{Certificate, EigenError, EigenOptions, Eigenbasis, InertiaCount, Method, Watch, eigenbasis};
-pub use inspect::{Inspection, inspect};
-pub use join::{Join, JoinError, join};
+pub use coupling::{CouplingError, Tie};
+pub use eigen::{
+    Certificate, EigenError, EigenOptions, Eigenbasis, InertiaCount, Instructions, Method, Orthogonality, Seconds,
+    Watch, eigenbasis,
+};
+pub use inspect::{Inspection, Reason, inspect};
+pub use join::{Join, JoinError, join, ties_of};
 pub use mesh::{Mesh, MeshError};
-pub use operator::{Csr, Operator, OperatorError, OperatorOptions, operator};
+pub use operator::{Csr, Kind, Mass, Operator, OperatorError, OperatorOptions, UnknownName, operator};

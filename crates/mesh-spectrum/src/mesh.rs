@@ -7,6 +7,8 @@
 
 use thiserror::Error;
 
+use crate::split::{CORNERS_MAX, split};
+
 /// A point or vector in space, in the model's length unit.
 pub(crate) type Point = [f64; 3];
 
@@ -19,6 +21,15 @@ pub struct Mesh {
     triangles: Vec<[u32; 3]>,
     face_of_triangle: Vec<u32>,
     faces_left_out: usize,
+    /// The faces as they were given, without repeated corners; absent where all are triangles.
+    rings: Option<Rings>,
+}
+
+/// Rings of vertices one after another: face f is `corners[start[f]..start[f + 1]]`, empty where it was left out.
+#[derive(Debug, Clone, PartialEq)]
+struct Rings {
+    start: Vec<usize>,
+    corners: Vec<u32>,
 }
 
 /// Why arrays are not a mesh.
@@ -49,6 +60,16 @@ pub enum MeshError {
         /// How many faces were given.
         faces: usize,
     },
+    /// A face has more corners than a mesh can be expected to mean.
+    #[error(
+        "face {face}: {corners} corners, at most {CORNERS_MAX} are split into triangles; split it in the program that made it"
+    )]
+    TooManyCorners {
+        /// The face, numbered from 0 as given.
+        face: usize,
+        /// Its different corners.
+        corners: usize,
+    },
     /// More vertices or faces than 32-bit indices can name.
     #[error("{given} {what}: at most {} can be numbered", u32::MAX)]
     TooMany {
@@ -65,48 +86,71 @@ impl Mesh {
     /// # Errors
     /// Indices out of range, coordinates that are not finite, no triangle.
     pub fn new(vertices: Vec<[f64; 3]>, triangles: Vec<[u32; 3]>) -> Result<Mesh, MeshError> {
-        check(&vertices, &triangles)?;
+        check(&vertices, triangles.iter().map(|triangle| &triangle[..]))?;
         if triangles.is_empty() {
             return Err(MeshError::NoTriangle { faces: 0 });
         }
         let face_of_triangle = (0..triangles.len() as u32).collect();
-        Ok(Mesh { vertices, triangles, face_of_triangle, faces_left_out: 0 })
+        Ok(Mesh { vertices, triangles, face_of_triangle, faces_left_out: 0, rings: None })
     }
 
     /// A mesh of triangles and quadrilaterals, as shell elements come: `[a, b, c, d]` in order around the face,
-    /// `[a, b, c, c]` a triangle.
-    ///
-    /// A quadrilateral is split along the diagonal with the larger minimum angle of its two triangles; along a–c
-    /// when both are alike to 1e-4 rad (so that rounding does not decide on rectangles: single-precision
-    /// coordinates leave about 1e-6). A face that repeats one of
-    /// its vertices is a triangle; one with fewer than three different vertices is left out and counted
-    /// ([`faces_left_out`](Mesh::faces_left_out)).
+    /// `[a, b, c, c]` a triangle. See [`Mesh::from_polygons`].
     ///
     /// # Errors
     /// As for [`Mesh::new`].
     pub fn from_faces(vertices: Vec<[f64; 3]>, faces: &[[u32; 4]]) -> Result<Mesh, MeshError> {
-        check(&vertices, faces)?;
-        let mut triangles = Vec::with_capacity(2 * faces.len());
-        let mut face_of_triangle = Vec::with_capacity(2 * faces.len());
+        Mesh::from_polygons(vertices, faces.iter().map(|face| &face[..]))
+    }
+
+    /// A mesh of polygons, each a ring of vertex indices in order around the face.
+    ///
+    /// A quadrilateral is split along the diagonal with the larger minimum angle of its two triangles; along the one
+    /// from its first corner when both are alike to 1e-4 rad (so that rounding does not decide on rectangles:
+    /// single-precision coordinates leave about 1e-6). A polygon of up to 64 corners becomes the triangles whose
+    /// smallest angle is largest. A triangle that is turned over against its face counts as worse than any other, so a
+    /// face that is not convex is cut through its inward corner.
+    ///
+    /// A corner that a face repeats is taken once; a face with fewer than three different vertices is left out and
+    /// counted ([`faces_left_out`](Mesh::faces_left_out)).
+    ///
+    /// # Errors
+    /// As for [`Mesh::new`], and a face with more than 64 corners.
+    pub fn from_polygons<'a>(
+        vertices: Vec<[f64; 3]>,
+        faces: impl Iterator<Item = &'a [u32]> + Clone,
+    ) -> Result<Mesh, MeshError> {
+        check(&vertices, faces.clone())?;
+        let (mut triangles, mut face_of_triangle) = (Vec::new(), Vec::new());
         let mut faces_left_out = 0;
-        for (face, corners) in faces.iter().enumerate() {
-            let mut ring: Vec<u32> = Vec::with_capacity(4);
+        let mut rings = Rings { start: vec![0], corners: Vec::new() };
+        for (face, corners) in faces.enumerate() {
+            let first = rings.corners.len();
             for &corner in corners {
-                if !ring.contains(&corner) {
-                    ring.push(corner);
+                if !rings.corners[first..].contains(&corner) {
+                    if rings.corners.len() - first == CORNERS_MAX {
+                        return Err(MeshError::TooManyCorners { face, corners: corners.len() });
+                    }
+                    rings.corners.push(corner);
                 }
             }
-            match ring[..] {
-                [a, b, c] => triangles.push([a, b, c]),
-                [a, b, c, d] => triangles.extend(split(&vertices, [a, b, c, d])),
-                _ => faces_left_out += 1,
+            if rings.corners.len() - first < 3 {
+                rings.corners.truncate(first);
+                faces_left_out += 1;
+            }
+            rings.start.push(rings.corners.len());
+            split(&vertices, &rings.corners[first..], &mut triangles);
+            if triangles.len() > u32::MAX as usize / 2 {
+                return Err(MeshError::TooMany { what: "faces", given: triangles.len() });
             }
             face_of_triangle.resize(triangles.len(), face as u32);
         }
+        let faces = rings.start.len() - 1;
         if triangles.is_empty() {
-            return Err(MeshError::NoTriangle { faces: faces.len() });
+            return Err(MeshError::NoTriangle { faces });
         }
-        Ok(Mesh { vertices, triangles, face_of_triangle, faces_left_out })
+        let rings = (triangles.len() + faces_left_out > faces).then_some(rings);
+        Ok(Mesh { vertices, triangles, face_of_triangle, faces_left_out, rings })
     }
 
     /// N vertices, in the model's length unit.
@@ -129,15 +173,50 @@ impl Mesh {
         self.faces_left_out
     }
 
+    /// How many faces were given, those left out included.
+    pub fn faces(&self) -> usize {
+        self.rings.as_ref().map_or(self.triangles.len() + self.faces_left_out, |rings| rings.start.len() - 1)
+    }
+
+    /// The faces that are in the mesh, each with its number as given and its corners in order, none of them twice.
+    pub fn rings(&self) -> impl Iterator<Item = (u32, &[u32])> {
+        let polygons = self.rings.iter().flat_map(|rings| {
+            let ring = |ends: &[usize]| &rings.corners[ends[0]..ends[1]];
+            let numbered = (0..).zip(rings.start.windows(2));
+            numbered.map(move |(face, ends)| (face, ring(ends))).filter(|(_, ring)| !ring.is_empty())
+        });
+        let triangles = if self.rings.is_some() { &[] } else { &self.triangles[..] };
+        polygons.chain(self.face_of_triangle.iter().copied().zip(triangles.iter().map(|triangle| &triangle[..])))
+    }
+
+    /// The mesh without the vertices that no face uses, and for each vertex kept its number here. Faces keep their
+    /// numbers.
+    pub fn without_unused_vertices(&self) -> (Mesh, Vec<u32>) {
+        let mut new = vec![u32::MAX; self.vertices.len()];
+        self.rings().flat_map(|(_, ring)| ring).for_each(|&vertex| new[vertex as usize] = 0);
+        let kept: Vec<u32> = (0..).zip(&new).filter(|(_, new)| **new == 0).map(|(vertex, _)| vertex).collect();
+        kept.iter().zip(0..).for_each(|(&old, number)| new[old as usize] = number);
+        let renumbered = |corners: &[u32]| corners.iter().map(|&corner| new[corner as usize]).collect();
+        let rings = self.rings.as_ref();
+        let mesh = Mesh {
+            vertices: kept.iter().map(|&vertex| self.vertices[vertex as usize]).collect(),
+            triangles: self.triangles.iter().map(|triangle| triangle.map(|vertex| new[vertex as usize])).collect(),
+            face_of_triangle: self.face_of_triangle.clone(),
+            faces_left_out: self.faces_left_out,
+            rings: rings.map(|rings| Rings { start: rings.start.clone(), corners: renumbered(&rings.corners) }),
+        };
+        (mesh, kept)
+    }
+
     /// The three corner points of a triangle.
     pub(crate) fn corners(&self, triangle: [u32; 3]) -> [Point; 3] {
         triangle.map(|vertex| self.vertices[vertex as usize])
     }
 }
 
-fn check<const CORNERS: usize>(vertices: &[Point], faces: &[[u32; CORNERS]]) -> Result<(), MeshError> {
+fn check<'a>(vertices: &[Point], faces: impl Iterator<Item = &'a [u32]> + Clone) -> Result<(), MeshError> {
     // Half the range of u32, because two triangles may come from a face.
-    for (what, given) in [("vertices", vertices.len()), ("faces", faces.len())] {
+    for (what, given) in [("vertices", vertices.len()), ("faces", faces.clone().count())] {
         if given > u32::MAX as usize / 2 {
             return Err(MeshError::TooMany { what, given });
         }
@@ -145,35 +224,12 @@ fn check<const CORNERS: usize>(vertices: &[Point], faces: &[[u32; CORNERS]]) -> 
     if let Some(vertex) = vertices.iter().position(|point| !point.iter().all(|x| x.is_finite())) {
         return Err(MeshError::NotFinite { vertex, point: vertices[vertex] });
     }
-    for (face, corners) in faces.iter().enumerate() {
+    for (face, corners) in faces.enumerate() {
         if let Some(&vertex) = corners.iter().find(|&&corner| corner as usize >= vertices.len()) {
             return Err(MeshError::VertexOutOfRange { face, vertex, vertices: vertices.len() });
         }
     }
     Ok(())
-}
-
-/// Minimum angles closer than this, in radians, count as equal.
-const ALIKE: f64 = 1e-4;
-
-/// The two triangles of a quadrilateral, split along the diagonal with the larger minimum angle.
-fn split(vertices: &[Point], [a, b, c, d]: [u32; 4]) -> [[u32; 3]; 2] {
-    let smallest = |halves: [[u32; 3]; 2]| {
-        let angles = |half: [u32; 3]| smallest_angle(half.map(|vertex| vertices[vertex as usize]));
-        angles(halves[0]).min(angles(halves[1]))
-    };
-    let along_ac = [[a, b, c], [a, c, d]];
-    let along_bd = [[a, b, d], [b, c, d]];
-    if smallest(along_bd) > smallest(along_ac) + ALIKE { along_bd } else { along_ac }
-}
-
-/// The smallest angle of a triangle, in radians; 0 where an edge has no length.
-fn smallest_angle([a, b, c]: [Point; 3]) -> f64 {
-    let angle = |at: Point, to: Point, and: Point| {
-        let (u, v) = (sub(to, at), sub(and, at));
-        norm(cross(u, v)).atan2(dot(u, v))
-    };
-    angle(a, b, c).min(angle(b, c, a)).min(angle(c, a, b))
 }
 
 pub(crate) fn sub(a: Point, b: Point) -> Point {
@@ -247,15 +303,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_quadrilateral_is_split_along_the_better_diagonal() {
-        // A kite, long in x: the diagonal b-d (short, through the middle) leaves angles of 53°, a-c leaves 14°.
-        let kite = vec![[-2.0, 0.0, 0.0], [0.0, -1.0, 0.0], [2.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-        let mesh = Mesh::from_faces(kite, &[[0, 1, 2, 3]]).unwrap();
-        assert_eq!(mesh.triangles(), [[0, 1, 3], [1, 2, 3]]);
-        assert_eq!(mesh.face_of_triangle(), [0, 0]);
-    }
-
-    #[test]
     fn faces_with_repeated_vertices() {
         let square = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
         let mesh = Mesh::from_faces(square.clone(), &[[0, 0, 1, 1], [0, 1, 2, 2], [0, 1, 2, 3]]).unwrap();
@@ -263,6 +310,17 @@ mod tests {
         assert_eq!(mesh.face_of_triangle(), [1, 2, 2]);
         assert_eq!(mesh.faces_left_out(), 1);
         assert_eq!(Mesh::from_faces(square, &[[0, 0, 1, 1]]), Err(MeshError::NoTriangle { faces: 1 }));
+    }
+
+    #[test]
+    fn unused_vertices_are_dropped_and_named() {
+        let vertices = vec![[9.0; 3], [0.0; 3], [1.0, 0.0, 0.0], [8.0; 3], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+        let mesh = Mesh::from_polygons(vertices, [&[1u32, 2, 4, 5][..], &[3, 3, 0]].into_iter()).unwrap();
+        assert_eq!((mesh.faces(), mesh.faces_left_out()), (2, 1));
+        let (small, kept) = mesh.without_unused_vertices();
+        assert_eq!(kept, [1, 2, 4, 5]);
+        assert_eq!(small.triangles(), [[0, 1, 2], [0, 2, 3]]);
+        assert_eq!(small.rings().collect::<Vec<_>>(), [(0, &[0u32, 1, 2, 3][..])]);
     }
 
     #[test]

@@ -42,7 +42,7 @@ fn the_bundle_is_what_its_data_sheet_says() {
 fn five_hundred_eigenvalues_agree_with_scipy() {
     let stored: Value = serde_json::from_str(include_str!("../testdata/hat-section.json")).unwrap();
     for (name, join) in [("separate", None), ("joined_at_2.5_mm", Some(2.5))] {
-        let built = operator(&hat_section(), &OperatorOptions { join }).unwrap();
+        let built = operator(&hat_section(), &OperatorOptions { join, ..Default::default() }).unwrap();
         assert_eq!(built.mass.len() as u64, stored[name]["dofs"].as_u64().unwrap());
         let theirs: Vec<f64> =
             stored[name]["eigenvalues"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect();

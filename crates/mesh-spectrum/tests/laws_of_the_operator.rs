@@ -63,7 +63,7 @@ fn parallel_plates_joined_are_one_surface() {
     assert_eq!((joined.pairs, joined.dofs), (13 * 9, 13 * 9));
 
     let apart = operator(&mesh, &OperatorOptions::default()).unwrap();
-    let one = operator(&mesh, &OperatorOptions { join: seen.gap }).unwrap();
+    let one = operator(&mesh, &OperatorOptions { join: seen.gap, ..Default::default() }).unwrap();
     assert_eq!((apart.components, one.components), (2, 1));
     assert!((one.mass.iter().sum::<f64>() - 2.0 * 9600.0).abs() < 1e-9);
     assert_eq!(one.vertex_mass, apart.vertex_mass);

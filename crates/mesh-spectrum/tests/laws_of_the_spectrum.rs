@@ -68,6 +68,18 @@ fn unit_sphere_has_multiplicities_of_2l_plus_1() {
 }
 
 #[test]
+fn closed_sphere_to_degree_twenty() {
+    // 10 242 vertices, 441 pairs. The error is O(h² λ), h = 0.035: bands of 2l + 1 stay apart, with nothing between.
+    let basis = solve(&build(icosphere(5)), 441);
+    assert_eq!(basis.certificate.method, Method::Sliced);
+    for l in 0..=20usize {
+        let band = &basis.eigenvalues[l * l..(l + 1) * (l + 1)];
+        let exact = (l * (l + 1)) as f64;
+        assert!(band.iter().all(|e| (e - exact).abs() <= 0.001 * exact * (1.0 + 0.5 * exact)), "l = {l}: {band:?}");
+    }
+}
+
+#[test]
 fn nothing_moves_under_rotation_translation_or_renumbering() {
     let (vertices, triangles) = rough(40, 30);
     let basis = solve(&build((vertices.clone(), triangles.clone())), 100);

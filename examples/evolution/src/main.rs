@@ -15,6 +15,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crumple::Error;
 use crumple::basis::{Basis, BasisOptions, coefficients};
+use crumple::joints::Join;
 use crumple::monitor::{Monitor, Place, Rule, Track, Verdict};
 use crumple::reference::Reference;
 use crumple::rotation::{self, Ruler};
@@ -53,7 +54,8 @@ impl Part {
     fn load() -> Result<Self, Error> {
         let run = Path::new(env!("CARGO_MANIFEST_DIR")).join("../hat-section/runs/run_001");
         let reference = Reference::of_run(&Run::open("run_001", &run)?, &[])?;
-        let basis = Basis::compute(&reference, &BasisOptions { eigenpairs: 60, join: Some(2.5) }, &())?;
+        let options = BasisOptions { eigenpairs: 60, join: Some(Join::Distance(2.5)), ..Default::default() };
+        let basis = Basis::compute(&reference, &[], &options, &())?;
         let ruler = Ruler::of(&basis);
         let mut part = Self { reference, basis, ruler, target: Track::default(), computed: AtomicUsize::new(0) };
         part.target = Track::new((1..=STATES).map(|state| part.place(HIDDEN, state)));

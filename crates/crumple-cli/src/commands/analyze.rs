@@ -45,6 +45,7 @@ pub(crate) struct Analyze {
 
 impl Analyze {
     pub(crate) fn run(&self, output: &Output, watch: &dyn Watch) -> Result<Answer, Error> {
+        self.basis.options()?;
         let (modes_options, describe_options) = (self.modes.options()?, self.describe.options(Set::default())?);
         let table = self.add.table()?;
         let mut seconds = Stopwatch::start();
@@ -53,7 +54,8 @@ impl Analyze {
             // A table that fits no run is found out before the eigenbasis is computed.
             table.join(&found.iter().map(|run| run.id.as_str()).collect::<Vec<_>>())?;
         }
-        let reference = self.reference_run(&found)?;
+        let known = Study::open(&self.output).ok().and_then(|study| study.settings().deck.clone());
+        let reference = self.basis.with_deck(self.reference_run(&found)?, known.as_deref())?;
         seconds.lap("find");
         let mut study = self.open_or_create(&reference, found.len(), watch)?;
         seconds.lap("init");
@@ -76,12 +78,13 @@ impl Analyze {
         }
         let path = crumple::report::save(&loaded.study, &page)?;
         seconds.lap("report");
-        init::advise(&loaded.basis, output);
+        init::advise(&loaded, output)?;
         early_words(&loaded.study).iter().for_each(|words| output.note(words));
+        modes.notes.iter().for_each(|words| output.note(words));
         let facts = json!({
             "study": self.output,
             "report": path,
-            "init": init::facts(&loaded),
+            "init": init::facts(&loaded)?,
             "add": add::facts(&loaded.study, &added),
             "modes": super::modes::facts(&modes),
             "descriptors": descriptors.iter().map(describe::facts).collect::<Vec<_>>(),
@@ -91,7 +94,7 @@ impl Analyze {
             let unit = &loaded.study.settings().length_unit;
             format!(
                 "{}\n\n{}\n\nreport: {}",
-                super::modes::words(&modes, unit),
+                super::modes::words(&modes, loaded.study.settings()),
                 descriptor_words(&descriptors, unit),
                 path.display()
             )
@@ -123,7 +126,7 @@ impl Analyze {
     }
 
     fn open_or_create(&self, reference: &Run, runs: usize, watch: &dyn Watch) -> Result<Study, Error> {
-        let (options, fields) = (self.basis.options(), self.basis.fields()?);
+        let (options, fields) = (self.basis.options()?, self.basis.fields()?);
         if runs < modes::RUNS_MIN && !self.output.exists() {
             // Found out before the eigenbasis is computed, but after what else is wrong with the one run.
             Reference::of_run(reference, &self.basis.parts)?;
@@ -138,7 +141,7 @@ impl Analyze {
                 if study.is_for(reference, &self.basis.parts, &fields, &options)? {
                     return Ok(study);
                 }
-                let what = "the study here has another mesh, other parts or fields, another join or another number of eigenpairs"
+                let what = "the study here has another mesh, other parts or fields, another operator, another join or another number of eigenpairs"
                     .to_owned();
                 Err(Error::StudyExists { folder, what })
             }

@@ -40,7 +40,7 @@ impl Compare {
 }
 
 fn words(comparison: &Comparison, unit: &str) -> String {
-    let rows = comparison.rows.iter().map(|row| {
+    let rows = comparison.rows.iter().chain(&comparison.rotation).map(|row| {
         vec![
             row.label.clone(),
             row.query.clone(),
@@ -67,13 +67,15 @@ fn words(comparison: &Comparison, unit: &str) -> String {
                 method,
                 modes.count.to_string(),
                 if modes.chosen { "chosen" } else { "given" }.into(),
+                modes.without.to_string(),
                 format!("{:.2}", modes.silhouette),
                 format!("{:.2}", modes.ari),
                 format!("{:.2}", modes.ari_all),
             ]
         });
         text += "\n\nmodes found without labels, against them (adjusted Rand index)\n";
-        text += &table(&["by", "method", "#modes", "number", "#silhouette", "#ARI", "#ARI, all labels"], rows);
+        text +=
+            &table(&["by", "method", "#modes", "number", "#no mode", "#silhouette", "#ARI", "#ARI, all labels"], rows);
     }
     text
 }

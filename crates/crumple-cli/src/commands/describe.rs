@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use crumple::Error;
 use crumple::descriptor::{self, Descriptor, Selected, Set};
+use crumple::explain::spectrum_words;
 use crumple::modes;
 use crumple::reconstruct::Errors;
 use crumple::select::Kind;
@@ -61,7 +62,10 @@ impl Describe {
         let path = descriptor::save(&loaded.study, &described.descriptor)?;
         let mut facts = facts(&described.descriptor);
         facts["path"] = json!(path);
-        output.print(&facts, || words(&described.descriptor, &loaded.study.settings().length_unit));
+        let unit = &loaded.study.settings().length_unit;
+        let spectrum = spectrum_words(&loaded.basis, &described.descriptor.spectrum, unit);
+        facts["words"] = json!(spectrum);
+        output.print(&facts, || format!("{}\n{spectrum}", words(&described.descriptor, unit)));
         Ok(Answer::Done)
     }
 }

@@ -110,7 +110,7 @@ impl Keys {
                 Err(_) => Err(Error::Stopped),
             },
             Self::Pipe(stdin) => {
-                for byte in stdin.bytes() {
+                for byte in std::io::BufReader::with_capacity(1, stdin).bytes() {
                     match byte {
                         Ok(byte) if byte.is_ascii_whitespace() => {}
                         Ok(byte) => return Ok(Some(char::from(byte))),

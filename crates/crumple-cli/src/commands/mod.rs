@@ -3,9 +3,13 @@
 mod add;
 mod analyze;
 mod check;
+mod classify;
 mod compare;
+mod convert;
 mod describe;
 mod distance;
+mod eigen;
+mod explain;
 mod export;
 mod features;
 mod info;
@@ -33,11 +37,15 @@ pub(crate) enum Answer {
 
 /// The commands, in the order in which they are used.
 #[derive(Subcommand)]
+// Made once, from the command line.
+#[allow(clippy::large_enum_variant)]
 pub(crate) enum Command {
     /// All of it: find the runs, make the study, find the modes, describe them, write the report
     Analyze(analyze::Analyze),
     /// What a result file or a study holds
     Info(info::Info),
+    /// Eigenpairs of any mesh or result file, alone
+    Eigen(eigen::Eigen),
     /// Make a study: the reference mesh and its eigenbasis
     Init(init::Init),
     /// Add runs to a study: project each of their states
@@ -50,6 +58,10 @@ pub(crate) enum Command {
     Search(search::Search),
     /// Does each run deform as the descriptor says? Exit code 1 if one does not
     Verify(verify::Verify),
+    /// Which mode each run belongs to, with a margin, or none. Exit code 1 if one has none
+    Classify(classify::Classify),
+    /// Why two runs are alike or different: at which wavelengths, which way, and where on the part
+    Explain(explain::Explain),
     /// One number for an optimiser: how far a run is from a descriptor
     Distance(distance::Distance),
     /// The numbers that are compared, one row a run, for optimisers and meta-models
@@ -60,6 +72,8 @@ pub(crate) enum Command {
     Reconstruct(reconstruct::Reconstruct),
     /// Arrays and tables for other tools
     Export(export::Export),
+    /// A run as another d3plot family: other precision, byte order, size of the files
+    Convert(convert::Convert),
     /// The descriptor against its rivals: size, errors, and, given labels, quality of the ranking
     Compare(compare::Compare),
     /// One self-contained page for a person
@@ -73,17 +87,21 @@ impl Command {
         match self {
             Self::Analyze(command) => command.run(output, watch),
             Self::Info(command) => command.run(output),
+            Self::Eigen(command) => command.run(output, watch),
             Self::Init(command) => command.run(output, watch),
             Self::Add(command) => command.run(output, watch),
             Self::Modes(command) => command.run(output, watch),
             Self::Describe(command) => command.run(output),
             Self::Search(command) => command.run(output),
             Self::Verify(command) => command.run(output),
+            Self::Classify(command) => command.run(output),
+            Self::Explain(command) => command.run(output),
             Self::Distance(command) => command.run(output),
             Self::Features(command) => command.run(output),
             Self::Monitor(command) => command.run(output, watch),
             Self::Reconstruct(command) => command.run(output),
             Self::Export(command) => command.run(output),
+            Self::Convert(command) => command.run(output, watch),
             Self::Compare(command) => command.run(output),
             Self::Report(command) => command.run(output, watch),
             Self::Check(command) => command.run(output),

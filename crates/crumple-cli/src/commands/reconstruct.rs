@@ -109,7 +109,7 @@ impl Reconstruct {
                     &self.output,
                     &loaded.reference,
                     shape,
-                    &[("displacement", &displacement), ("error", &error)],
+                    &[("displacement", displacement.as_flattened()), ("error", error.as_flattened())],
                 )
             }
             Some("obj") => write_obj(&self.output, shape, mesh.triangles()),

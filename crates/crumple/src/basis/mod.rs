@@ -1,37 +1,45 @@
 //! The eigenbasis of the reference mesh, as a study keeps it, and what it is good for.
 //!
-//! L φ = λ M φ with cotangent stiffness L and lumped mass M, Φᵀ M Φ = I; see `mesh-spectrum` for the solver. A study
-//! stores eigenvectors as f32, and everything is computed with the rounded ones, so that a run added later is
-//! projected on exactly the vectors of the first.
+//! L φ = λ M φ with cotangent stiffness L and lumped mass M, or another operator of `mesh-spectrum`, Φᵀ M Φ = I; the
+//! solver is there too. A study stores eigenvectors as f32, and everything is computed with the rounded ones, so that a
+//! run added later is projected on exactly the vectors of the first.
+//!
+//! Two weights are kept apart, which only the lumped mass makes one. M is what coefficients are made with, so whatever is
+//! compared with coefficients (how much of a displacement they catch, the energy of a rotation field) is taken in M. What
+//! is told in lengths (root mean square displacements, errors of reconstructions) is a mean over the area of the surface.
 
 mod transform;
 
 use std::ops::Range;
 
 use faer::{Mat, Side};
-use mesh_spectrum::{EigenOptions, OperatorOptions, Watch};
+use mesh_spectrum::{Csr, EigenOptions, Kind, Mass, OperatorOptions, Tie, Watch};
 use serde::{Deserialize, Serialize};
 
 pub(crate) use transform::coefficients_of;
 pub use transform::{coefficients, synthesize};
 
 use crate::Error;
+use crate::joints::Join;
 use crate::reference::Reference;
-use crate::vector::Vector;
+use crate::vector::{Vector, dot, square};
 
 /// What is asked of the eigenbasis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BasisOptions {
     /// Eigenpairs K. Default 500 (Iza-Teran and Garcke 2018); a mesh with fewer vertices gives as many as it has.
     pub eigenpairs: usize,
-    /// Mutually nearest vertices of different components closer than this become one degree of freedom of the
-    /// operator. Default: components stay apart.
-    pub join: Option<f64>,
+    /// How separate sheets become one. Default: components stay apart.
+    pub join: Option<Join>,
+    /// Which discretisation of the Laplacian. Default: cotangent.
+    pub kind: Kind,
+    /// Which mass. Default: lumped.
+    pub mass: Mass,
 }
 
 impl Default for BasisOptions {
     fn default() -> Self {
-        Self { eigenpairs: 500, join: None }
+        Self { eigenpairs: 500, join: None, kind: Kind::default(), mass: Mass::default() }
     }
 }
 
@@ -44,8 +52,14 @@ pub struct Basis {
     pub eigenvalues: Vec<f64>,
     /// Φ, K × N, one eigenvector after another, in 1/length.
     pub eigenvectors: Vec<f32>,
-    /// Lumped mass of each vertex, N, in length².
+    /// M on vertices, N, diagonal: lumped areas in length², or with the identity as mass how many vertices each stands
+    /// for, 1 unless a deck ties others to it.
     pub mass: Vec<f64>,
+    /// M on vertices, N × N, where it is not diagonal; then `mass` holds the sums of its rows.
+    pub mass_matrix: Option<Csr>,
+    /// The surface's area, shared out among vertices, N, in length²; whatever M is. Means over the surface use it, and
+    /// products with Φ use M. With the lumped mass both are the same.
+    pub area: Vec<f64>,
     /// α⁰ = Φᵀ M p⁰, K × 3, in length².
     pub baseline: Vec<[f64; 3]>,
     /// What is known about it.
@@ -57,10 +71,25 @@ pub struct Basis {
 pub struct BasisFacts {
     /// Eigenpairs asked for.
     pub asked: usize,
-    /// Distance of the join, if any.
-    pub join: Option<f64>,
-    /// Pairs of vertices that the join made one.
+    /// How separate sheets were joined, if at all.
+    pub join: Option<Join>,
+    /// Name of the discretisation.
+    #[serde(default = "cotan")]
+    pub operator: String,
+    /// Name of the mass.
+    #[serde(default = "lumped")]
+    pub mass: String,
+    /// What speaks for the tufted operator on this mesh; empty where it was used.
+    #[serde(default)]
+    pub tufted_advice: Vec<String>,
+    /// Pairs of vertices that the join made one, or ties by which vertices follow others.
     pub joined_pairs: usize,
+    /// Of these ties those that hold nothing more, because others hold their vertex already.
+    #[serde(default)]
+    pub idle_ties: usize,
+    /// Vertices that follow several others, and so have no mass of their own.
+    #[serde(default)]
+    pub followers: usize,
     /// Connected components of the mesh.
     pub components: usize,
     /// Zero eigenvalues: connected components of the operator, after joining.
@@ -91,22 +120,33 @@ pub struct BasisFacts {
     pub close: Vec<(usize, usize)>,
 }
 
+fn cotan() -> String {
+    Kind::default().to_string()
+}
+
+fn lumped() -> String {
+    Mass::default().to_string()
+}
+
 impl Basis {
-    /// Computes the eigenbasis of the reference mesh.
+    /// Computes the eigenbasis of the reference mesh; `ties` are what a deck holds of it.
     ///
     /// # Errors
     /// [`Error::Join`], [`Error::Operator`], [`Error::Eigen`], [`Error::Stopped`].
-    pub fn compute(reference: &Reference, options: &BasisOptions, watch: &dyn Watch) -> Result<Self, Error> {
-        let &BasisOptions { eigenpairs, join } = options;
+    pub fn compute(
+        reference: &Reference,
+        ties: &[Tie],
+        options: &BasisOptions,
+        watch: &dyn Watch,
+    ) -> Result<Self, Error> {
+        let &BasisOptions { eigenpairs, join, kind, mass } = options;
         if eigenpairs == 0 {
             return Err(Error::Value { name: "-K", value: "0".into(), expected: "at least one eigenpair".into() });
         }
         let inspection = mesh_spectrum::inspect(&reference.mesh);
-        let joined_pairs = join
-            .map(|distance| mesh_spectrum::join(&reference.mesh, distance))
-            .transpose()?
-            .map_or(0, |join| join.pairs);
-        let operator = mesh_spectrum::operator(&reference.mesh, &OperatorOptions { join }).map_err(Error::Operator)?;
+        let distance = join.and_then(Join::distance);
+        let operator_options = OperatorOptions { join: distance, ties: ties.to_vec(), kind, mass };
+        let operator = mesh_spectrum::operator(&reference.mesh, &operator_options)?;
         let solved =
             mesh_spectrum::eigenbasis(&operator, &EigenOptions { count: eigenpairs, ..Default::default() }, watch)?;
         let eigenvectors: Vec<f32> = solved.eigenvectors.iter().map(|&x| x as f32).collect();
@@ -114,12 +154,20 @@ impl Basis {
         let facts = BasisFacts {
             asked: eigenpairs,
             join,
-            joined_pairs,
+            operator: kind.to_string(),
+            mass: mass.to_string(),
+            tufted_advice: match kind {
+                Kind::Tufted => Vec::new(),
+                _ => inspection.reasons.iter().map(ToString::to_string).collect(),
+            },
+            joined_pairs: operator.pairs_joined + ties.len(),
+            idle_ties: operator.idle_ties,
+            followers: operator.followers.len(),
             components: inspection.components,
             null_space: solved.certificate.components,
             join_advice: inspection.gap.filter(|_| join.is_none()),
             area: inspection.area,
-            length: length_of(reference.mesh.vertices(), &operator.vertex_mass),
+            length: length_of(reference.mesh.vertices(), &operator.vertex_area),
             non_manifold_edges: inspection.non_manifold_edges,
             flat_triangles: inspection.triangles_without_area,
             residual: solved.certificate.residual_max,
@@ -134,6 +182,8 @@ impl Basis {
             eigenvalues: solved.eigenvalues,
             eigenvectors,
             mass: operator.vertex_mass,
+            mass_matrix: operator.vertex_mass_matrix,
+            area: operator.vertex_area,
             baseline: Vec::new(),
             facts,
         };
@@ -151,6 +201,45 @@ impl Basis {
         self.mass.len()
     }
 
+    /// ‖1‖²_M, the sum of all entries of M: the surface's area, or with the identity as mass the number of vertices.
+    /// What the squared norm of coefficients is divided by to make it a mean: Σ |Φᵀ M f|² / ‖1‖²_M is the mean square of
+    /// f in M, as far as K eigenvectors go.
+    pub fn total_mass(&self) -> f64 {
+        self.mass.iter().sum()
+    }
+
+    /// What eigenvalues are multiplied by to be in 1/length²: 1, and N / A for N vertices on the area A with the identity as
+    /// mass, whose eigenvalues are pure numbers (exact where all vertices have the same area).
+    pub(crate) fn per_square_length(&self) -> f64 {
+        if self.facts.mass == Mass::Identity.to_string() { self.total_mass() / self.facts.area } else { 1.0 }
+    }
+
+    /// ‖f‖²_M of a vector function on the vertices, N × 3: what the squares of all its coefficients sum to.
+    pub(crate) fn square_norm(&self, values: &[[f64; 3]]) -> f64 {
+        match self.mass_matrix {
+            Some(_) => {
+                let products = values.iter().zip(self.weigh(values)).map(|(f, w)| dot(*f, w));
+                products.sum::<f64>().max(0.0) // not below by rounding
+            }
+            None => values.iter().zip(&self.mass).map(|(f, m)| m * square(*f)).sum(),
+        }
+    }
+
+    /// M f for a vector function on the vertices, N × 3.
+    pub(crate) fn weigh(&self, values: &[[f64; 3]]) -> Vec<[f64; 3]> {
+        match &self.mass_matrix {
+            Some(matrix) => (0..matrix.rows())
+                .map(|row| {
+                    let add = |sum: [f64; 3], (column, m): (usize, f64)| {
+                        std::array::from_fn(|c| sum[c] + m * values[column][c])
+                    };
+                    matrix.row(row).fold([0.0; 3], add)
+                })
+                .collect(),
+            None => values.iter().zip(&self.mass).map(|(value, m)| value.map(|x| m * x)).collect(),
+        }
+    }
+
     /// One eigenvector, N; `eigenvector` counts from 1 as in the paper.
     pub fn eigenvector(&self, eigenvector: usize) -> &[f32] {
         let n = self.vertices();
@@ -166,25 +255,28 @@ impl Basis {
 }
 
 /// √12 times the largest standard deviation of the surface along a line.
-fn length_of(vertices: &[Vector], mass: &[f64]) -> f64 {
-    let area: f64 = mass.iter().sum();
-    let mean = |of: &dyn Fn(&Vector) -> f64| vertices.iter().zip(mass).map(|(p, m)| m * of(p)).sum::<f64>() / area;
+fn length_of(vertices: &[Vector], areas: &[f64]) -> f64 {
+    let area: f64 = areas.iter().sum();
+    let mean = |of: &dyn Fn(&Vector) -> f64| vertices.iter().zip(areas).map(|(p, a)| a * of(p)).sum::<f64>() / area;
     let centre: Vector = std::array::from_fn(|c| mean(&|p| p[c]));
     let covariance = Mat::from_fn(3, 3, |a, b| mean(&|p| (p[a] - centre[a]) * (p[b] - centre[b])));
     let variances = covariance.self_adjoint_eigenvalues(Side::Lower).unwrap_or_default();
     (12.0 * variances.last().copied().unwrap_or(0.0)).sqrt()
 }
 
-/// Largest ‖Lφ − λMφ‖ in the M⁻¹ norm over λ_K, on the degrees of freedom of the operator.
+/// Largest ‖Lφ − λMφ‖ in the M⁻¹ norm over λ_K, on the degrees of freedom of the operator. For a mass that is not diagonal
+/// in the norm of its row sums' inverse, which is at most twice as small.
 fn residual(operator: &mesh_spectrum::Operator, eigenvalues: &[f64], eigenvectors: &[f64]) -> f64 {
     let n = operator.vertex_mass.len();
-    let mut on_dofs = vec![0.0; operator.mass.len()];
     let residuals = eigenvalues.iter().zip(eigenvectors.chunks_exact(n)).map(|(lambda, phi)| {
-        // Vertices that the join made one have the same value.
-        operator.dof_of_vertex.iter().zip(phi).for_each(|(&dof, &x)| on_dofs[dof as usize] = x);
+        let on_dofs = operator.on_dofs(phi);
         let stiff = operator.stiffness.times(&on_dofs);
-        let square = |((s, m), x): ((&f64, &f64), &f64)| (s - lambda * m * x).powi(2) / m;
-        stiff.iter().zip(&operator.mass).zip(&on_dofs).map(square).sum::<f64>().sqrt()
+        let weighed = match &operator.mass_matrix {
+            Some(mass) => mass.times(&on_dofs),
+            None => operator.mass.iter().zip(&on_dofs).map(|(m, x)| m * x).collect(),
+        };
+        let square = |((s, m), w): ((&f64, &f64), &f64)| (s - lambda * w).powi(2) / m;
+        stiff.iter().zip(&operator.mass).zip(&weighed).map(square).sum::<f64>().sqrt()
     });
     let largest = eigenvalues.last().copied().filter(|&lambda| lambda > 0.0).unwrap_or(1.0);
     residuals.fold(0.0, f64::max) / largest

@@ -23,12 +23,21 @@ pub(crate) fn coefficients_of<F: AsRef<[[f64; 3]]>>(basis: &Basis, functions: &[
     let mut result = Mat::<f64>::zeros(columns, k);
     let mut weighted = vec![0.0; BLOCK * columns];
     let mut widened = vec![0.0; BLOCK * k];
+    // A mass that is not diagonal reaches beyond the block.
+    let whole: Vec<Vec<[f64; 3]>> = match &basis.mass_matrix {
+        Some(_) => functions.iter().map(|values| basis.weigh(values.as_ref())).collect(),
+        None => Vec::new(),
+    };
     for first in (0..n).step_by(BLOCK) {
         let rows = BLOCK.min(n - first);
         for (function, values) in functions.iter().enumerate() {
+            let weighed = whole.get(function);
             for (row, point) in values.as_ref()[first..first + rows].iter().enumerate() {
                 for (component, x) in point.iter().enumerate() {
-                    weighted[row * columns + 3 * function + component] = x * basis.mass[first + row];
+                    weighted[row * columns + 3 * function + component] = match weighed {
+                        Some(weighed) => weighed[first + row][component],
+                        None => x * basis.mass[first + row],
+                    };
                 }
             }
         }

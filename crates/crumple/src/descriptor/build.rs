@@ -134,7 +134,8 @@ pub fn find(loaded: &Loaded, word: &str, only: Option<&[usize]>) -> Result<Descr
                 other => Some(other?),
             };
             if let Some(mode) = modes.as_ref().and_then(|modes| modes.mode(word).ok()) {
-                return of_run(&Named { run: mode.medoid.clone(), state: None });
+                let described = of_run(&Named { run: mode.medoid.clone(), state: None })?;
+                return Ok(Descriptor { name: mode.name.clone(), mode: Some(mode.name.clone()), ..described });
             }
             let named = Named::in_study(study, word);
             if study.manifest().runs.contains_key(&named.run) || Path::new(&named.run).exists() {
@@ -347,11 +348,12 @@ pub(crate) fn choose(
     } else {
         0.0
     };
+    let total_mass = basis.total_mass();
     let always = if is_shape { basis.always_in_reconstruction() } else { 1..1 };
     threshold.select(&values, function.components(), signed, |order, m| {
         let left_out = order[m..].iter().filter(|j| !always.contains(j));
         let rest: f64 = left_out.map(|&j| square(values[j - 1])).sum();
-        (beyond * beyond + rest / basis.facts.area).sqrt()
+        (beyond * beyond + rest / total_mass).sqrt()
     })
 }
 

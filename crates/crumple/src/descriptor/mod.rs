@@ -52,9 +52,9 @@ pub struct Descriptor {
     pub beside: Vec<Selected>,
     /// The rotation spectrum.
     pub spectrum: RotationSpectrum,
-    /// How similar runs of its mode are to it, and others, if that was measured.
+    /// From which similarity on a run does what it says, if that was measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub calibration: Option<serde_json::Value>,
+    pub calibration: Option<Calibration>,
 }
 
 /// Eigenvectors that matter for one function, and the target's values on them.
@@ -106,6 +106,27 @@ pub struct Rival {
     /// Its errors.
     #[serde(flatten)]
     pub errors: Errors,
+}
+
+/// A threshold and how well it does.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Calibration {
+    /// What was compared.
+    pub kind: Kind,
+    /// The smallest similarity that passes.
+    pub threshold: f64,
+    /// Runs that do what the descriptor says; the one it was made from is not among them.
+    pub right: usize,
+    /// Runs that do not.
+    pub wrong: usize,
+    /// Folds of the cross-validation.
+    pub folds: usize,
+    /// Share of the runs that do not which would pass, on runs that the threshold was not chosen by.
+    pub false_pass: f64,
+    /// Share of the runs that do which would fail, likewise.
+    pub false_fail: f64,
+    /// The smallest similarity to its nearest neighbour in the study with which a run is like something known.
+    pub known: f64,
 }
 
 /// How to describe.

@@ -12,8 +12,15 @@ pub(super) enum Linkage {
     Average,
 }
 
-/// The group of each point.
-pub(super) fn agglomerate(distances: &Distances, count: usize, linkage: Linkage) -> Vec<usize> {
+/// All merges of R points, from which the groups for any number follow.
+pub(super) struct Merges {
+    count: usize,
+    /// Distance, and a point of either half; R − 1 of them, nearest first.
+    merges: Vec<(f64, usize, usize)>,
+}
+
+/// All merges. Works on a matrix of f64: 800 MB at ten thousand runs.
+pub(super) fn agglomerate(distances: &Distances, linkage: Linkage) -> Merges {
     let n = distances.count;
     let start = |a: usize, b: usize| match linkage {
         Linkage::Ward => distances.between(a, b).powi(2),
@@ -60,24 +67,29 @@ pub(super) fn agglomerate(distances: &Distances, count: usize, linkage: Linkage)
     }
     // The chain finds merges out of order; both linkages are monotone, so sorting restores the order.
     merges.sort_by(|x, y| x.0.total_cmp(&y.0));
-    groups_after(n, &merges[..n.saturating_sub(count)])
+    Merges { count: n, merges }
 }
 
-fn groups_after(n: usize, merges: &[(f64, usize, usize)]) -> Vec<usize> {
-    let mut parent: Vec<usize> = (0..n).collect();
-    fn root(parent: &[usize], mut at: usize) -> usize {
-        while parent[at] != at {
-            at = parent[at];
+impl Merges {
+    /// The group of each point when `count` groups are left.
+    pub(super) fn groups(&self, count: usize) -> Vec<usize> {
+        let n = self.count;
+        let mut parent: Vec<usize> = (0..n).collect();
+        for &(_, a, b) in &self.merges[..n.saturating_sub(count)] {
+            let (a, b) = (root(&parent, a), root(&parent, b));
+            parent[a.max(b)] = a.min(b);
         }
-        at
+        let roots: Vec<usize> = (0..n).map(|run| root(&parent, run)).collect();
+        let mut distinct = roots.clone();
+        distinct.sort_unstable();
+        distinct.dedup();
+        roots.iter().map(|root| distinct.binary_search(root).unwrap_or(0)).collect()
     }
-    for &(_, a, b) in merges {
-        let (a, b) = (root(&parent, a), root(&parent, b));
-        parent[a.max(b)] = a.min(b);
+}
+
+fn root(parent: &[usize], mut at: usize) -> usize {
+    while parent[at] != at {
+        at = parent[at];
     }
-    let roots: Vec<usize> = (0..n).map(|run| root(&parent, run)).collect();
-    let mut distinct = roots.clone();
-    distinct.sort_unstable();
-    distinct.dedup();
-    roots.iter().map(|root| distinct.binary_search(root).unwrap_or(0)).collect()
+    at
 }

@@ -2,29 +2,41 @@
 
 use std::collections::BTreeMap;
 
+use rayon::prelude::*;
+
 use super::Distances;
 
 /// (b − a) / max(a, b) for each run: a the mean distance to the others of its group, b the mean distance to the
-/// nearest other group. 0 for a run that is alone in its group, and for a single group.
-pub(crate) fn silhouettes(distances: &Distances, groups: &[usize]) -> Vec<f64> {
-    let count = groups.iter().max().map_or(0, |most| most + 1);
+/// nearest other group. 0 for a run that is alone in its group, and for a single group; none for a run without a group,
+/// which counts for no other run either.
+pub(crate) fn silhouettes(distances: &Distances, groups: &[Option<usize>]) -> Vec<Option<f64>> {
+    let count = groups.iter().flatten().max().map_or(0, |most| most + 1);
     let mut sizes = vec![0_usize; count];
-    groups.iter().for_each(|&group| sizes[group] += 1);
+    groups.iter().flatten().for_each(|&group| sizes[group] += 1);
     let of = |run: usize| {
+        let own = groups[run]?;
         let mut sums = vec![0.0; count];
-        (0..groups.len()).for_each(|other| sums[groups[other]] += distances.between(run, other));
-        let own = groups[run];
+        for (other, group) in groups.iter().enumerate() {
+            if let Some(group) = *group {
+                sums[group] += distances.between(run, other);
+            }
+        }
         if sizes[own] < 2 {
-            return 0.0;
+            return Some(0.0);
         }
         let a = sums[own] / (sizes[own] - 1) as f64;
         let others = (0..count).filter(|&group| group != own && sizes[group] > 0);
         let b = others.map(|group| sums[group] / sizes[group] as f64).fold(f64::INFINITY, f64::min);
-        if b.is_infinite() || a.max(b) == 0.0 { 0.0 } else { (b - a) / a.max(b) }
+        Some(if b.is_infinite() || a.max(b) == 0.0 { 0.0 } else { (b - a) / a.max(b) })
     };
-    (0..groups.len()).map(of).collect()
+    (0..groups.len()).into_par_iter().map(of).collect()
 }
 
+/// The mean over the runs that have a group; 0 where none has.
+pub(super) fn mean_silhouette(values: &[Option<f64>]) -> f64 {
+    let count = values.iter().flatten().count();
+    values.iter().flatten().sum::<f64>() / count.max(1) as f64
+}
 /// Agreement of two groupings of the same things, 1 when they are the same, about 0 when they are independent.
 pub fn adjusted_rand_index(a: &[usize], b: &[usize]) -> f64 {
     let pairs = |n: usize| (n * n.saturating_sub(1)) as f64 / 2.0;

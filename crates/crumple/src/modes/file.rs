@@ -1,6 +1,6 @@
 //! Modes on disk: `modes.parquet`, one row a run, with everything else in its metadata.
 
-use super::Modes;
+use super::{Membership, Modes};
 use crate::Error;
 use crate::study::{Column, Study, metadata_of, write_columns};
 
@@ -17,18 +17,18 @@ pub fn save(study: &Study, modes: &Modes) -> Result<(), Error> {
     write_columns(&study.folder().join(FILE), &columns(modes), Some((KEY, whole)))
 }
 
-/// The membership of each run as a table.
+/// The membership of each run as a table; a run without a mode has empty cells.
 pub(crate) fn columns(modes: &Modes) -> Vec<(String, Column)> {
     let medoid = |run: &str| modes.modes.iter().any(|mode| mode.medoid == run);
-    let texts = |text: &dyn Fn(&super::Membership) -> &str| {
-        Column::Text(modes.runs.iter().map(|run| Some(text(run).to_owned())).collect())
-    };
+    let number = |of: &dyn Fn(&Membership) -> Option<f64>| Column::Number(modes.runs.iter().map(of).collect());
     vec![
-        ("run".to_owned(), texts(&|run| &run.run)),
-        ("mode".to_owned(), texts(&|run| &run.mode)),
+        ("run".to_owned(), Column::Text(modes.runs.iter().map(|run| Some(run.run.clone())).collect())),
+        ("mode".to_owned(), Column::Text(modes.runs.iter().map(|run| run.mode.clone()).collect())),
         ("medoid".to_owned(), Column::Flag(modes.runs.iter().map(|run| medoid(&run.run)).collect())),
-        ("distance".to_owned(), Column::Number(modes.runs.iter().map(|run| Some(run.distance)).collect())),
-        ("silhouette".to_owned(), Column::Number(modes.runs.iter().map(|run| Some(run.silhouette)).collect())),
+        ("distance".to_owned(), number(&|run| run.distance)),
+        ("silhouette".to_owned(), number(&|run| run.silhouette)),
+        ("strength".to_owned(), number(&|run| run.strength)),
+        ("score".to_owned(), number(&|run| run.score)),
         ("outlier".to_owned(), Column::Flag(modes.runs.iter().map(|run| run.outlier).collect())),
     ]
 }

@@ -7,23 +7,24 @@ use rayon::prelude::*;
 use super::{Points, square_distance};
 
 /// Starts that are tried.
-const RESTARTS: u64 = 20;
+pub(super) const STARTS: u64 = 20;
 /// Iterations of one start; Lloyd's iteration on a few hundred points ends after a few dozen.
 const ITERATIONS_MAX: usize = 300;
 
 /// The group of each point. The result depends on the seed, not on the number of threads: each start has its own
 /// stream of random numbers, and the best is taken by sum of squares, ties by the order of the starts.
-pub(super) fn kmeans(points: &Points, count: usize, seed: u64) -> Vec<usize> {
-    let runs: Vec<(f64, Vec<usize>)> = (0..RESTARTS)
-        .into_par_iter()
-        .map(|start| {
-            let mut random = ChaCha8Rng::seed_from_u64(seed);
-            random.set_stream(start);
-            lloyd(points, plus_plus(points, count, &mut random))
-        })
-        .collect();
+pub(super) fn kmeans(points: &Points, count: usize, seed: u64, starts: u64) -> Vec<usize> {
+    let runs: Vec<(f64, Vec<usize>)> =
+        (0..starts).into_par_iter().map(|start| one_start(points, count, seed, start)).collect();
     let best = runs.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
     best.map(|(_, groups)| groups).unwrap_or_default()
+}
+
+/// Sum of squares and groups from one start.
+pub(super) fn one_start(points: &Points, count: usize, seed: u64, start: u64) -> (f64, Vec<usize>) {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    random.set_stream(start);
+    lloyd(points, plus_plus(points, count, &mut random))
 }
 
 /// Starting centres: each next one with a probability proportional to its squared distance from those before.

@@ -1,6 +1,7 @@
 //! The floor of the rule from the runs that are known: how far the members of the descriptor's mode stray from its path.
 //!
-//! At every state of the target's path the floor is the 5 % quantile of its members' similarities there. What that rule
+//! At every state of the target's path the floor is the 5 % quantile of its members' similarities there, or a twentieth of
+//! the way from 1 to the other modes' where the members lie closer together than that. What that rule
 //! would have done is told beside it: how many members it would stop, each judged by a floor made without it, and how
 //! many of the runs of other modes.
 
@@ -15,6 +16,10 @@ use crate::study::{Loaded, Rows};
 
 /// Share of the members that lie below the floor at any one state.
 pub const QUANTILE: f64 = 0.05;
+
+/// A run that is twenty times nearer to the target than the runs of other modes are is on its path, however close to it the
+/// members that are known lie: states are interpolated, and files are rounded.
+const NEAR: f64 = 0.05;
 
 /// Fewer members than this, beside the target, tell nothing about a band.
 const MEMBERS_MIN: usize = 3;
@@ -81,9 +86,11 @@ pub fn calibrate(
         )));
     }
     let bands: Vec<Vec<Option<f64>>> = members.iter().map(|member| similarities(target, member)).collect();
+    let far: Vec<Vec<Option<f64>>> = others.iter().map(|other| similarities(target, other)).collect();
+    let far: Vec<Option<f64>> = (0..target.places().len()).map(|state| median(&far, state)).collect();
     let with = |left_out: Option<usize>| {
         let kept = bands.iter().enumerate().filter(|(at, _)| Some(*at) != left_out).map(|(_, band)| band);
-        Rule { floor: floor(target, &kept.collect::<Vec<_>>()), ..rule.clone() }
+        Rule { floor: floor(target, &kept.collect::<Vec<_>>(), &far), ..rule.clone() }
     };
     let stopped_at = |track: &Track, rule: Rule| {
         let mut monitor = Monitor::new(target.clone(), rule);
@@ -114,15 +121,24 @@ fn similarities(target: &Track, run: &Track) -> Vec<Option<f64>> {
     target.places().iter().map(at).collect()
 }
 
-/// The quantile at each state of the target that any run reached.
-fn floor(target: &Track, bands: &[&Vec<Option<f64>>]) -> Vec<(f64, f64)> {
+/// Median similarity of the runs that reached a state of the target.
+fn median(bands: &[Vec<Option<f64>>], state: usize) -> Option<f64> {
+    let mut values: Vec<f64> = bands.iter().filter_map(|band| band[state]).collect();
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+/// The quantile at each state of the target that any run reached. `far`: how similar runs of other modes are there.
+fn floor(target: &Track, bands: &[&Vec<Option<f64>>], far: &[Option<f64>]) -> Vec<(f64, f64)> {
     let at = |(state, place): (usize, &super::Place)| {
         let mut values: Vec<f64> = bands.iter().filter_map(|band| band[state]).collect();
         values.sort_by(f64::total_cmp);
         let lowest = (QUANTILE * (values.len() as f64 - 1.0)).max(0.0);
         let (below, share) = (lowest as usize, lowest.fract());
         let value = |at: usize| values.get(at).or(values.last()).copied();
-        Some((place.at, value(below)? * (1.0 - share) + share * value(below + 1)?))
+        let quantile = value(below)? * (1.0 - share) + share * value(below + 1)?;
+        let near = far[state].map_or(1.0, |far| 1.0 - NEAR * (1.0 - far));
+        Some((place.at, quantile.min(near)))
     };
     let floor: Vec<(f64, f64)> = target.places().iter().enumerate().filter_map(at).collect();
     if floor.is_empty() { vec![(0.0, 0.0)] } else { floor }

@@ -68,7 +68,8 @@ pub fn follow<T>(
                 return Err(Error::Restarted { run: path.to_owned(), before: seen, now: states });
             }
             let ready = if settled { states } else { states.saturating_sub(1).max(seen) };
-            for state in seen..ready {
+            while seen < ready {
+                let state = seen;
                 if watch.stopped() {
                     return Err(Error::Stopped);
                 }

@@ -35,6 +35,7 @@ pub use stop::{STOP_FILE, run_folder, stop};
 use crate::Error;
 use crate::descriptor::Descriptor;
 use crate::features::Features;
+use crate::rotation::TURN_MIN;
 use crate::select::Kind;
 use crate::similarity::cosine;
 use crate::study::{Function, Loaded, Rows, Stored};
@@ -307,7 +308,8 @@ impl<'a> Tracker<'a> {
 
     fn put(&self, stored: &[Stored<'_>], time: f64, moved: f64) -> Place {
         let amount = match self.kind {
-            Kind::Rotation => stored.first().map_or(0.0, |stored| stored.rms),
+            // Less is rounding of the files.
+            Kind::Rotation => stored.first().map(|stored| stored.rms).filter(|rms| *rms >= TURN_MIN).unwrap_or(0.0),
             Kind::Paper => moved,
         };
         let at = match self.align {

@@ -10,9 +10,11 @@ use serde::Serialize;
 
 use super::picture::{View, picture};
 use super::shapes::{MeshData, plain, shapes, z_displacement};
-use super::words::{isometry_words, join_words, mode_words, warnings};
+use super::words::{deck_words, isometry_words, join_words, mode_words, warnings};
 use crate::Error;
 use crate::descriptor::{self, DescribeOptions, Described, FIRST_M, Rival, Threshold, describe};
+use crate::explain::spectrum_words;
+use crate::joints::Join;
 use crate::modes::{By, Mode, Modes, Tried};
 use crate::reconstruct::Errors;
 use crate::select::Kind;
@@ -46,8 +48,12 @@ struct StudyFacts {
     triangles: usize,
     components: usize,
     joined: Option<f64>,
+    /// What welds and ties of the deck hold, in words, where they joined the pieces.
+    joined_by_deck: Option<String>,
     join_advice: Option<String>,
     eigenpairs: usize,
+    operator: String,
+    mass: String,
     length_unit: String,
     time_unit: String,
     area: f64,
@@ -240,9 +246,12 @@ fn study_facts(loaded: &Loaded) -> StudyFacts {
         vertices: reference.vertices(),
         triangles: reference.mesh.triangles().len(),
         components: facts.components,
-        joined: facts.join,
+        joined: facts.join.and_then(Join::distance),
+        joined_by_deck: (facts.join == Some(Join::DECK)).then(|| deck_words(facts)),
         join_advice: facts.join_advice.map(|distance| join_words(facts.components, distance, unit)),
         eigenpairs: basis.eigenpairs(),
+        operator: facts.operator.clone(),
+        mass: facts.mass.clone(),
         length_unit: unit.clone(),
         time_unit: settings.time_unit.clone(),
         area: facts.area,
@@ -298,7 +307,7 @@ fn run_data(loaded: &Loaded, modes: &Modes, cloud: usize, similarity: &[Similari
         let member = membership.get(id.as_str());
         RunData {
             id: id.clone(),
-            mode: member.map(|member| member.mode.clone()),
+            mode: member.and_then(|member| member.mode.clone()),
             outlier: member.is_some_and(|member| member.outlier),
             states: record.times.len(),
             times: record
@@ -310,8 +319,8 @@ fn run_data(loaded: &Loaded, modes: &Modes, cloud: usize, similarity: &[Similari
                 .collect(),
             cloud: clouds.remove(id.as_str()).unwrap_or_default(),
             similarity: by_run.get(id.as_str()).cloned().unwrap_or_default(),
-            distance_to_medoid: member.map(|member| member.distance),
-            silhouette: member.map(|member| member.silhouette),
+            distance_to_medoid: member.and_then(|member| member.distance),
+            silhouette: member.and_then(|member| member.silhouette),
             max_displacement: record.last.max,
             rigid_share: record.last.rigid_share,
             captured: record.last.captured,
@@ -354,7 +363,11 @@ fn mode_data(
         silhouette: mode.silhouette,
         spread: mode.spread,
         color,
-        words: mode_words(loaded, &described.original),
+        words: format!(
+            "{}; {}",
+            mode_words(loaded, &described.original),
+            spectrum_words(&loaded.basis, &descriptor.spectrum, &loaded.study.settings().length_unit)
+        ),
         picture: format!("data:image/png;base64,{}", base64::engine::general_purpose::STANDARD.encode(png)),
         descriptor: DescriptorData {
             select: selected.select.word(),

@@ -3,6 +3,7 @@
 use std::cmp::Ordering;
 
 use super::shapes::z_displacement;
+use crate::basis::BasisFacts;
 use crate::modes::Modes;
 use crate::study::{Loaded, RunRecord, Study};
 
@@ -12,6 +13,12 @@ pub(super) fn join_words(components: usize, distance: f64, unit: &str) -> String
         "the mesh is {components} pieces that share no nodes, a small distance apart; each has a spectrum of its own, and equal pieces bring nearly equal eigenvalues in pairs. \
          To treat them as one part: --join {distance} ({unit})"
     )
+}
+
+/// What a deck holds together, in words.
+pub(super) fn deck_words(facts: &BasisFacts) -> String {
+    let pieces = if facts.null_space == 1 { "one piece".to_owned() } else { format!("{} pieces", facts.null_space) };
+    format!("joined to {pieces} by {} ties of the deck's welds and tied contacts", facts.joined_pairs - facts.idle_ties)
 }
 
 /// How far the surfaces are from isometric, in words.

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use super::store::Lock;
-use super::{Error, FileRecord, LOCK, Loaded, Manifest, Rows, Study, coefficients, tables};
+use super::{Error, FileRecord, LOCK, Loaded, Manifest, Rows, Study, coefficients, joints_file, tables};
+use crate::joints::Join;
 
 /// What a check found.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
@@ -77,6 +78,7 @@ fn contradictions(folder: &Path, manifest: &Manifest) -> Vec<String> {
     let attempt = || -> Result<Vec<String>, Error> {
         let mut problems = Vec::new();
         let loaded = Loaded::of(Study::open(folder)?)?;
+        problems.extend(join_not_held(&loaded)?);
         let rows = loaded.study.coefficients(Some(&[1]), Rows::All)?;
         let mut states = std::collections::BTreeMap::<&str, usize>::new();
         for run in &rows.runs {
@@ -91,4 +93,46 @@ fn contradictions(folder: &Path, manifest: &Manifest) -> Vec<String> {
         Ok(problems)
     };
     attempt().unwrap_or_else(|error| vec![error.to_string()])
+}
+
+/// Whether the basis is that of the surface joined as the settings say: every vertex that follows others has the mean of
+/// their values in every eigenvector.
+fn join_not_held(loaded: &Loaded) -> Result<Option<String>, Error> {
+    let Loaded { study, reference, basis, .. } = loaded;
+    if study.settings().join != basis.facts.join {
+        return Ok(Some("study.toml and the basis say different things about the join".into()));
+    }
+    let ties = match study.settings().join {
+        None => return Ok(None),
+        Some(Join::Distance(distance)) => mesh_spectrum::ties_of(&reference.mesh, distance)?,
+        Some(Join::Deck(_)) => match study.joints()? {
+            Some(joints) => joints_file::ties(&joints, reference, &study.settings().reference)?,
+            None => Vec::new(),
+        },
+    };
+    if ties.len() != basis.facts.joined_pairs {
+        return Ok(Some(format!(
+            "{} vertices are joined, the basis was made with {}",
+            ties.len(),
+            basis.facts.joined_pairs
+        )));
+    }
+    // A tie of a vertex that others hold already says nothing; the basis was made without it.
+    let mut broken: Vec<bool> = vec![false; ties.len()];
+    for phi in basis.eigenvectors.chunks_exact(basis.vertices()) {
+        let most = phi.iter().fold(0.0f32, |most, x| most.max(x.abs()));
+        for (tie, broken) in ties.iter().zip(&mut broken) {
+            let mean: f64 = tie.to.iter().map(|&(vertex, weight)| weight * f64::from(phi[vertex as usize])).sum();
+            // Eigenvectors are stored in single precision, and weights below 1e-6 are dropped.
+            *broken |= (f64::from(phi[tie.vertex as usize]) - mean).abs() > 1e-5 * f64::from(most);
+        }
+    }
+    let count = broken.iter().filter(|broken| **broken).count();
+    Ok((count > basis.facts.idle_ties).then(|| {
+        format!(
+            "{count} of {} ties are not held by the eigenvectors, {} are known to say nothing",
+            ties.len(),
+            basis.facts.idle_ties
+        )
+    }))
 }

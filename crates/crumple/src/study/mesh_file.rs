@@ -50,7 +50,7 @@ pub fn write_shape(
     path: &Path,
     reference: &Reference,
     positions: &[[f64; 3]],
-    fields: &[(&str, &[[f64; 3]])],
+    fields: &[(&str, &[f64])],
 ) -> Result<(), Error> {
     let node_ids = Array {
         name: "node_id",
@@ -58,8 +58,12 @@ pub fn write_shape(
         components: 1,
         bytes: reference.node_ids.iter().flat_map(|&id| (id as i64).to_le_bytes()).collect(),
     };
-    let fields =
-        fields.iter().map(|(name, values)| Array { name, kind: "Float64", components: 3, bytes: doubles(values) });
+    let fields = fields.iter().map(|(name, values)| Array {
+        name,
+        kind: "Float64",
+        components: values.len() / positions.len().max(1),
+        bytes: values.iter().flat_map(|x| x.to_le_bytes()).collect(),
+    });
     write_vtu(
         path,
         positions,

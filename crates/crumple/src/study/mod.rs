@@ -6,6 +6,7 @@
 //!   manifest.json           what is in it: files with checksums, a record a run; replaced by rename, last
 //!   mesh.vtu                the reference mesh
 //!   basis.safetensors       eigenvalues, eigenvectors, mass, baseline
+//!   joints.json             what the deck's welds and ties hold; only when joined by a deck
 //!   coefficients/*.parquet  immutable parts, named by content
 //!   runs.parquet            one row a run: the manifest's records as a table, renewed after the manifest
 //!   modes.parquet           the last answer of `modes`
@@ -20,6 +21,7 @@ mod add;
 mod basis_file;
 mod check;
 mod coefficients;
+mod joints_file;
 mod loaded;
 mod manifest;
 mod mesh_file;
@@ -49,6 +51,7 @@ use crate::Error;
 use crate::basis::{Basis, BasisOptions};
 use crate::error::io;
 use crate::field::Field;
+use crate::joints::{Join, Joints, joints};
 use crate::reference::Reference;
 use crate::run::Run;
 
@@ -71,15 +74,18 @@ pub struct Settings {
     pub parts: Vec<String>,
     /// Eigenpairs asked for.
     pub eigenpairs: usize,
-    /// Distance of the join; absent when components stay apart.
+    /// How separate sheets were joined: a distance, or `deck`; absent when components stay apart.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub join: Option<f64>,
+    pub join: Option<Join>,
+    /// The deck that gave titles and welds, where there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub deck: Option<PathBuf>,
     /// Quantities of the result files that are projected beside the shape.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fields: Vec<Field>,
-    /// The operator.
+    /// The operator: `cotan` (`cotangent` in older studies), `tufted` or `polygon`.
     pub operator: String,
-    /// The mass matrix.
+    /// The mass matrix: `lumped`, `consistent` or `identity`.
     pub mass: String,
     /// Unit of lengths: a label, nothing is converted.
     pub length_unit: String,
@@ -137,7 +143,9 @@ impl Study {
         if !run.times().is_empty() {
             fields.iter().try_for_each(|field| run.field(*field, 0).map(drop))?;
         }
-        let mut basis = Basis::compute(&reference, options, watch)?;
+        let joints = joints_of(run, &reference, options)?;
+        let ties = joints.as_ref().map_or(Ok(Vec::new()), |joints| joints_file::ties(joints, &reference, run.id()))?;
+        let mut basis = Basis::compute(&reference, &ties, options, watch)?;
         let staged = StagedFolder::beside(folder)?;
         let settings = Settings {
             reference: run.id().to_owned(),
@@ -146,8 +154,9 @@ impl Study {
             eigenpairs: options.eigenpairs,
             join: options.join,
             fields: fields.to_vec(),
-            operator: "cotangent".into(),
-            mass: "lumped".into(),
+            deck: run.deck().map(|deck| absolute(deck.path())),
+            operator: options.kind.to_string(),
+            mass: options.mass.to_string(),
             length_unit: "mm".into(),
             time_unit: "ms".into(),
         };
@@ -155,11 +164,16 @@ impl Study {
         store::write_bytes(&staged.path.join(SETTINGS), text.as_bytes())?;
         mesh_file::write(&reference, &staged.path.join(mesh_file::FILE))?;
         basis_file::write(&basis, &staged.path.join(basis_file::FILE))?;
+        let mut names = vec![SETTINGS, mesh_file::FILE, basis_file::FILE];
+        if let Some(joints) = &joints {
+            joints_file::write(joints, &staged.path.join(joints_file::FILE))?;
+            names.push(joints_file::FILE);
+        }
         for name in [coefficients::FOLDER, DESCRIPTORS] {
             let path = staged.path.join(name);
             std::fs::create_dir(&path).map_err(io("make the folder", &path))?;
         }
-        let files = [SETTINGS, mesh_file::FILE, basis_file::FILE]
+        let files = names
             .into_iter()
             .map(|name| Ok((name.to_owned(), FileRecord::of(&staged.path.join(name))?)))
             .collect::<Result<std::collections::BTreeMap<_, _>, Error>>()?;
@@ -207,7 +221,7 @@ impl Study {
         &self.manifest
     }
 
-    /// Whether the study is what these wishes would make: the same surface, parts, fields, eigenpairs and join.
+    /// Whether the study is what these wishes would make: the same surface, parts, fields, eigenpairs, operator and join.
     ///
     /// # Errors
     /// Those of [`Reference::of_run`] and [`Study::reference`].
@@ -221,9 +235,24 @@ impl Study {
         };
         Ok(self.settings.eigenpairs == options.eigenpairs
             && self.settings.join == options.join
+            && self.settings.operator.parse() == Ok(options.kind)
+            && self.settings.mass.parse() == Ok(options.mass)
             && self.settings.fields == fields
             && self.settings.parts == reference.parts
-            && same_mesh()?)
+            && same_mesh()?
+            && joints_of(run, &reference, options)?.map(|joints| joints.ties)
+                == self.joints()?.map(|joints| joints.ties))
+    }
+
+    /// What the deck's welds and ties hold, in a study that was joined by a deck.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Damaged`].
+    pub fn joints(&self) -> Result<Option<Joints>, Error> {
+        if self.settings.join != Some(Join::DECK) {
+            return Ok(None);
+        }
+        joints_file::read(&self.folder.join(joints_file::FILE)).map(Some)
     }
 
     /// The reference mesh.
@@ -349,6 +378,22 @@ impl Study {
         self.manifest = Manifest::read(&self.folder)?;
         Ok(())
     }
+}
+
+/// What the run's deck holds of the surface, where joining by it was asked for.
+fn joints_of(run: &Run, reference: &Reference, options: &BasisOptions) -> Result<Option<Joints>, Error> {
+    if options.join != Some(Join::DECK) {
+        return Ok(None);
+    }
+    let deck = run.deck().ok_or_else(|| Error::NoDeck { run: run.id().to_owned() })?;
+    let there: std::collections::HashSet<u64> = deck.node_ids.iter().copied().collect();
+    if let Some(missing) = reference.node_ids.iter().find(|id| !there.contains(id)) {
+        let what = format!("node {missing} of the surface is not in it ({} nodes there)", deck.node_ids.len());
+        return Err(Error::OtherDeck { deck: deck.path().to_owned(), what });
+    }
+    let mut found = joints(deck, reference);
+    found.deck = absolute(&found.deck);
+    Ok(Some(found))
 }
 
 pub(crate) fn absolute(path: &Path) -> PathBuf {

@@ -4,11 +4,9 @@
 //! [`Model`] is a mesh of shells with user ids and parts; [`Family`] writes it with its states; [`World`] is a folder of
 //! runs and studies that is gone when the test is.
 //!
-//! A family here is the smallest that a reader accepts: control block of 64 words, coordinates, shells, numbering, end
-//! mark, titles, end mark; then states of a time word and the nodes' positions, nothing else (IU = 1, NGLBV = NV2D = 0).
+//! A family here is the smallest that a reader accepts: its states hold the nodes' positions and nothing else.
 #![allow(dead_code, unreachable_pub, reason = "each test file uses its own part of the world")]
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use crumple::basis::BasisOptions;
@@ -18,12 +16,10 @@ use crumple::run::Run;
 use crumple::select::Kind;
 use crumple::study::{AddOptions, Added, Loaded, Study};
 use crumple::target::Named;
+use d3plot::{Content, Geometry, Part, Precision, Shell, WriteOptions, Writer};
 use proptest::test_runner::{Config, RngSeed};
 
 pub type Point = [f64; 3];
-
-/// The end of a member's states, and of the geometry.
-const END: f64 = -999_999.0;
 
 // ---- models -------------------------------------------------------------------------------------------------------
 
@@ -201,129 +197,26 @@ impl Family {
     /// Writes `root`, `root01`, …; the folder is made where it is missing.
     pub fn write(&self, root: &Path) {
         std::fs::create_dir_all(root.parent().expect("a root lies in a folder")).unwrap();
-        let mut words = Words { bytes: Vec::new(), double: self.double };
-        self.control(&mut words);
-        self.geometry(&mut words);
-        self.titles(&mut words);
-        if self.states_a_member == 0 {
-            self.member(&mut words, &self.states);
-            return words.save(root);
-        }
-        words.save(root);
-        for (number, states) in self.states.chunks(self.states_a_member).enumerate() {
-            let mut words = Words { bytes: Vec::new(), double: self.double };
-            self.member(&mut words, states);
-            let name = format!("{}{:02}", root.file_name().unwrap().to_string_lossy(), number + 1);
-            words.save(&root.with_file_name(name));
-        }
-    }
-
-    fn control(&self, words: &mut Words) {
-        let Model { nodes, shells, parts, .. } = &self.model;
-        let numbering = 16 + nodes.len() + shells.len() + 3 * parts.len();
-        // Word: value. INUM (a d3plot), NDIM, NUMNP, ICODE, IU, NEL4, NUMMAT4, MAXINT, NARBS, IOSHL (nothing), NMMAT.
-        let values = BTreeMap::from([
-            (11, 1),
-            (15, 4),
-            (16, nodes.len()),
-            (17, 6),
-            (20, 1),
-            (31, shells.len()),
-            (32, parts.len()),
-            (36, 3),
-            (39, numbering),
-            (43, 999),
-            (44, 999),
-            (45, 999),
-            (46, 999),
-            (51, parts.len()),
-        ]);
-        words.text("a world for tests", 10 * words.size());
-        for word in 10..64 {
-            match word {
-                13 => words.text("R910", words.size()),
-                14 => words.float(960.0),
-                _ => words.int(values.get(&word).map_or(0, |&value| value as u64)),
-            }
-        }
-    }
-
-    fn geometry(&self, words: &mut Words) {
         let Model { nodes, node_ids, shells, parts } = &self.model;
-        nodes.iter().flatten().for_each(|&x| words.float(x));
-        for (face, part) in shells {
-            face.iter().for_each(|&node| words.int(u64::from(node) + 1));
-            words.int(*part as u64 + 1);
+        let mut geometry = Geometry::default();
+        geometry.coordinates.clone_from(nodes);
+        geometry.node_ids = node_ids.iter().map(|&id| u64::from(id)).collect();
+        geometry.shells = shells.iter().map(|&(nodes, part)| Shell { nodes, part: part as u32 }).collect();
+        let parts: Vec<Part> = parts.iter().map(|(id, title)| Part::new(u64::from(*id), title)).collect();
+        let options = WriteOptions {
+            title: "a world for tests".into(),
+            precision: if self.double { Precision::Double } else { Precision::Single },
+            member_states: (self.states_a_member > 0).then_some(self.states_a_member),
+            states_in_root: self.states_a_member == 0,
+            ..WriteOptions::default()
+        };
+        let mut writer = Writer::create(root, &geometry, &parts, &Content::default(), &options).unwrap();
+        for (time, nodes) in &self.states {
+            let mut state = writer.state(*time);
+            state.coordinates(nodes).unwrap();
+            state.write().unwrap();
         }
-        // Pointers (the first negative: part lists follow), counts, lists.
-        words.int(u64::MAX);
-        (0..4).for_each(|_| words.int(1));
-        [nodes.len(), 0, 0, shells.len(), 0].into_iter().for_each(|count| words.int(count as u64));
-        [1, 1, 1, parts.len(), 0, parts.len()].into_iter().for_each(|word| words.int(word as u64));
-        node_ids.iter().for_each(|&id| words.int(u64::from(id)));
-        (1..=shells.len()).for_each(|id| words.int(id as u64));
-        let mut order: Vec<usize> = (0..parts.len()).collect();
-        order.sort_by_key(|&part| parts[part].0);
-        order.iter().for_each(|&part| words.int(u64::from(parts[part].0)));
-        parts.iter().for_each(|part| words.int(u64::from(part.0)));
-        order.iter().for_each(|&part| words.int(part as u64 + 1));
-        words.float(END);
-    }
-
-    fn titles(&self, words: &mut Words) {
-        words.int(90001);
-        words.int(self.model.parts.len() as u64);
-        for (id, title) in &self.model.parts {
-            words.int(u64::from(*id));
-            words.text(title, 72);
-        }
-        words.int(90000);
-        words.text("a world for tests", 72);
-        words.float(END);
-    }
-
-    fn member(&self, words: &mut Words, states: &[(f64, Vec<Point>)]) {
-        for (time, nodes) in states {
-            words.float(*time);
-            nodes.iter().flatten().for_each(|&x| words.float(x));
-        }
-        words.float(END);
-    }
-}
-
-/// Little-endian words of one size.
-struct Words {
-    bytes: Vec<u8>,
-    double: bool,
-}
-
-impl Words {
-    fn size(&self) -> usize {
-        if self.double { 8 } else { 4 }
-    }
-
-    fn int(&mut self, value: u64) {
-        let size = self.size();
-        self.bytes.extend(&value.to_le_bytes()[..size]);
-    }
-
-    fn float(&mut self, value: f64) {
-        if self.double {
-            self.bytes.extend(value.to_le_bytes());
-        } else {
-            self.bytes.extend((value as f32).to_le_bytes());
-        }
-    }
-
-    fn text(&mut self, text: &str, bytes: usize) {
-        self.bytes.extend(format!("{text:bytes$.bytes$}").into_bytes());
-    }
-
-    /// Padded to whole blocks of 512 words, as the solver does.
-    fn save(mut self, path: &Path) {
-        let block = 512 * self.size();
-        self.bytes.resize(self.bytes.len().next_multiple_of(block), 0);
-        std::fs::write(path, self.bytes).unwrap();
+        writer.finish().unwrap();
     }
 }
 
@@ -371,7 +264,7 @@ impl World {
 
     /// A study of the mesh of one run, without runs.
     pub fn empty_study(&self, name: &str, reference: &str, eigenpairs: usize) -> Study {
-        let options = BasisOptions { eigenpairs, join: None };
+        let options = BasisOptions { eigenpairs, ..Default::default() };
         Study::create(&self.path(name), &self.open(reference), &[], &[], &options, &()).unwrap()
     }
 

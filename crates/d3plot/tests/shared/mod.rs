@@ -81,6 +81,7 @@ pub fn read_everything(family: &d3plot::Family) -> Result<usize, d3plot::Error> 
     for state in 0..family.times().len() {
         for field in family.fields() {
             family.table(state, field.name)?;
+            family.values(state, field.name)?;
         }
         family.coordinates(state)?;
         family.velocity(state)?;

@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
-
 use crate::eigen::component::{Component, Pairs};
 use crate::eigen::finish::Evidence;
+use crate::eigen::output::eigenvectors;
+use crate::eigen::seconds::Seconds;
 use crate::eigen::slice::ROUNDING;
 use crate::operator::Operator;
 
@@ -57,6 +57,14 @@ pub struct Certificate {
     pub cluster_cut: bool,
     /// Which solver did the work.
     pub method: Method,
+    /// Factorisations, for shifts and for counts.
+    pub factorisations: usize,
+    /// Right-hand sides solved for.
+    pub solves: usize,
+    /// Bytes that the computation was expected to need at most, with the result.
+    pub peak_bytes: usize,
+    /// Where the time went. The only part of a basis that differs from run to run.
+    pub seconds: Seconds,
 }
 
 /// Eigenvalues of one component below a shift.
@@ -87,7 +95,7 @@ pub enum Method {
 pub(crate) fn merge(
     operator: &Operator,
     components: &[Component],
-    solved: &[Pairs],
+    solved: Vec<Pairs>,
     evidence: &[Evidence],
     next: Option<f64>,
     tolerance: f64,
@@ -101,29 +109,6 @@ pub(crate) fn merge(
     let eigenvalue = |&(number, k): &(usize, usize)| solved[number].eigenvalues[k];
     order.sort_by(|a, b| eigenvalue(a).total_cmp(&eigenvalue(b)).then(a.cmp(b)));
     let eigenvalues: Vec<f64> = order.iter().map(eigenvalue).collect();
-
-    // Vertices of each component with the row they have there.
-    let mut row_of_dof = vec![0u32; operator.mass.len()];
-    for component in components {
-        component.dofs.iter().enumerate().for_each(|(row, &dof)| row_of_dof[dof as usize] = row as u32);
-    }
-    let mut places: Vec<Vec<(u32, u32)>> = vec![Vec::new(); components.len()];
-    for (vertex, &dof) in operator.dof_of_vertex.iter().enumerate() {
-        places[operator.component_of_dof[dof as usize] as usize].push((vertex as u32, row_of_dof[dof as usize]));
-    }
-    let mut eigenvectors = vec![0.0; order.len() * vertices];
-    eigenvectors.par_chunks_mut(vertices).zip(&order).for_each(|(phi, &(number, k))| {
-        let component = &components[number];
-        let v = &solved[number].vectors[k * component.rows()..][..component.rows()];
-        for &(vertex, row) in &places[number] {
-            phi[vertex as usize] = v[row as usize] / component.root_mass[row as usize];
-        }
-        fix_sign(phi);
-    });
-
-    let norm = components.iter().map(|component| component.norm).fold(0.0, f64::max);
-    let scale = eigenvalues.last().copied().filter(|&last| last > 0.0).unwrap_or(norm).max(f64::MIN_POSITIVE);
-    let cluster_gap = 100.0 * tolerance * scale;
     let counts: Vec<InertiaCount> = solved
         .iter()
         .enumerate()
@@ -136,9 +121,15 @@ pub(crate) fn merge(
             })
         })
         .collect();
+    let dense = solved.iter().filter(|pairs| pairs.dense).count();
+    let sliced = solved.len() - dense;
+    let eigenvectors = eigenvectors(operator, components, solved, evidence, &order);
+
+    let norm = components.iter().map(|component| component.norm).fold(0.0, f64::max);
+    let scale = eigenvalues.last().copied().filter(|&last| last > 0.0).unwrap_or(norm).max(f64::MIN_POSITIVE);
+    let cluster_gap = 100.0 * tolerance * scale;
     let clusters = ranges(&eigenvalues, |_| cluster_gap);
     let sensitive = ranges(&eigenvalues, |eigenvalue| cluster_gap.max(1e-3 * eigenvalue));
-    let dense = solved.iter().filter(|pairs| pairs.dense).count();
     Eigenbasis {
         certificate: Certificate {
             residual_max: evidence.iter().map(|evidence| evidence.residual).fold(0.0, f64::max) / scale,
@@ -149,13 +140,17 @@ pub(crate) fn merge(
             components: components.len(),
             next_eigenvalue: next,
             cluster_cut: next.zip(eigenvalues.last()).is_some_and(|(next, last)| next - last <= cluster_gap),
-            method: if dense == solved.len() {
+            method: if sliced == 0 {
                 Method::Dense
             } else if dense == 0 {
                 Method::Sliced
             } else {
                 Method::Mixed
             },
+            factorisations: 0,
+            solves: 0,
+            peak_bytes: 0,
+            seconds: Seconds::default(),
         },
         eigenvalues,
         eigenvectors,
@@ -165,17 +160,8 @@ pub(crate) fn merge(
     }
 }
 
-/// Makes the entry of largest magnitude positive; among those within 1e-3 of it, the first.
-fn fix_sign(phi: &mut [f64]) {
-    let most = phi.iter().fold(0.0f64, |most, x| most.max(x.abs()));
-    let decides = phi.iter().find(|x| x.abs() >= (1.0 - 1e-3) * most);
-    if decides.is_some_and(|x| *x < 0.0) {
-        phi.iter_mut().for_each(|x| *x = 0.0 - *x); // 0 stays 0, not −0
-    }
-}
-
 /// Maximal runs of two or more ascending values whose neighbours are at most `gap(the upper value)` apart.
-fn ranges(values: &[f64], gap: impl Fn(f64) -> f64) -> Vec<Range<usize>> {
+pub(crate) fn ranges(values: &[f64], gap: impl Fn(f64) -> f64) -> Vec<Range<usize>> {
     let mut ranges = Vec::new();
     let mut start = 0;
     for k in 1..=values.len() {
@@ -192,14 +178,6 @@ fn ranges(values: &[f64], gap: impl Fn(f64) -> f64) -> Vec<Range<usize>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn sign_is_decided_by_the_lowest_of_nearly_equal_entries() {
-        let mut phi = [0.0, -1.0, 1.0 + 1e-12];
-        fix_sign(&mut phi);
-        assert_eq!(phi[1], 1.0);
-        assert_eq!(phi[0].to_bits(), 0, "zero keeps its sign");
-    }
 
     #[test]
     fn runs_of_close_values() {

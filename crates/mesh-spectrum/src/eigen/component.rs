@@ -7,14 +7,14 @@ use faer::{Mat, Side};
 use rayon::prelude::*;
 
 use crate::eigen::assemble::{assemble, check_counts};
+use crate::eigen::block::{Block, Pool, Row, WIDTH};
+use crate::eigen::chain::{Found, Span, blocks_needed, chain, slices_expected};
 use crate::eigen::factor::{Factor, Symbolic, elimination_order, permuted};
-use crate::eigen::slice::{Demand, Slice, Trouble, norm, slice};
+use crate::eigen::kernel::Kind;
+use crate::eigen::slice::{Tools, Trouble, norm};
 use crate::eigen::weyl::Weyl;
 use crate::eigen::{EigenError, Progress};
 use crate::operator::{Csr, Operator};
-
-/// Pairs on either side of a shift. Fewer: more factorisations; more: larger spaces. Between 25 and 40 the time is flat.
-const PAIRS_A_SIDE: usize = 28;
 
 /// Up to this size the dense solver is used: a slice solves a projected problem of 250 to 300 itself.
 pub(crate) const DENSE_BELOW: usize = 400;
@@ -23,18 +23,13 @@ pub(crate) const DENSE_BELOW: usize = 400;
 /// place for slices: there is nothing on one side, and Weyl's law does not hold.
 pub(crate) const DENSE_SHARE: f64 = 0.9;
 
-/// Pairs that neighbouring slices both find, a side, so that they check each other and the border can be put into the
+/// Pairs of a chain of slices, about. The number of chains decides how many threads can work on slices, and must not
+/// depend on how many there are; each chain starts without a hand-over, which costs a tenth of a slice's time.
+const PAIRS_A_CHAIN: usize = 250;
+
+/// Pairs that neighbouring chains both find, a side, so that they check each other and the border can be put into the
 /// widest gap. Doubled at each new attempt.
 const OVERLAP: usize = 2;
-
-/// The largest |L| and the smallest |D| (in mean spacings of eigenvalues) a shift is used with: above and below, the
-/// solve loses digits (measured: 10 % of the shifts are moved).
-const GROWTH_MAX: f64 = 1e4;
-const PIVOT_MIN: f64 = 5e-3;
-
-/// Factors are kept from the count to the slice up to this size (about 50 MB each at most); beyond, memory is dearer
-/// than a second factorisation, a tenth of a slice's time.
-const KEEP_FACTORS_UP_TO: usize = 100_000;
 
 /// A connected component of the operator.
 pub(crate) struct Component {
@@ -53,19 +48,14 @@ pub(crate) struct Component {
     symbolic: Option<Symbolic>,
 }
 
-/// Where a slice is, and the eigenvalues below.
-struct Shift {
-    at: f64,
-    below: usize,
-    factor: Option<Factor>,
-}
-
 /// The lowest pairs of a component.
 pub(crate) struct Pairs {
     /// Ascending; the first is exactly 0.
     pub(crate) eigenvalues: Vec<f64>,
-    /// One vector v after another, each with as many entries as the component has rows.
-    pub(crate) vectors: Vec<f64>,
+    /// Blocks of as many rows as the component has, one after another.
+    pub(crate) vectors: Block,
+    /// Where each pair's vector is: 8 × block + column, ascending. Columns that belong to no pair hold anything finite.
+    pub(crate) places: Vec<usize>,
     /// Shifts, 1/ℓ², with the eigenvalues found below them and those counted by inertia.
     pub(crate) counts: Vec<(f64, usize, usize)>,
     pub(crate) dense: bool,
@@ -109,34 +99,35 @@ impl Component {
         self.dofs.len()
     }
 
-    /// Eigenvalues below a shift (1/ℓ²), by inertia; `None` if the shift is on one of them, to rounding. The component
-    /// must be prepared.
-    pub(crate) fn count_below(&self, shift: f64) -> Option<usize> {
+    /// Bytes of the matrix and of what was prepared for its factors.
+    pub(crate) fn bytes(&self) -> usize {
+        let matrix = 12 * self.matrix.columns.len() + 40 * self.rows();
+        matrix + self.symbolic.as_ref().map_or(0, Symbolic::bytes)
+    }
+
+    /// Bytes of one factorisation at its largest.
+    pub(crate) fn factor_bytes(&self) -> usize {
+        self.symbolic.as_ref().map_or(0, Symbolic::factor_bytes)
+    }
+
+    /// Eigenvalues below a shift (1/ℓ²), by inertia; `None` if the shift is on one of them, to rounding, or the work
+    /// has been stopped. The component must be prepared.
+    pub(crate) fn count_below(&self, shift: f64, progress: &Progress) -> Option<usize> {
+        progress.go_on().ok()?;
         let shift = shift / self.unit;
-        self.factor(shift).filter(|factor| factor.pivot_min > 1e-9 * shift).map(|factor| factor.below)
+        let factor = self.factor(shift, progress)?;
+        let below = (factor.pivot_min > 1e-9 * shift).then_some(factor.below);
+        self.recycle(factor);
+        below
     }
 
     /// Factors A − σI, both in `unit`.
-    fn factor(&self, shift: f64) -> Option<Factor> {
-        self.symbolic.as_ref().expect("prepared").factor(shift)
+    fn factor(&self, shift: f64, progress: &Progress) -> Option<Factor> {
+        self.symbolic.as_ref().expect("prepared").factor(shift, progress)
     }
 
-    /// Factors at a shift near the one given: moved up by 0.37 spacings while the factor is of poor quality.
-    fn factor_near(&self, shift: f64, spacing: f64) -> Option<Factor> {
-        let mut best: Option<Factor> = None;
-        for nudge in 0..4 {
-            let Some(factor) = self.factor(shift + 0.37 * spacing * nudge as f64) else {
-                continue;
-            };
-            let good = factor.growth < GROWTH_MAX && factor.pivot_min > PIVOT_MIN * spacing;
-            if best.as_ref().is_none_or(|best| factor.growth / factor.pivot_min < best.growth / best.pivot_min) {
-                best = Some(factor);
-            }
-            if good {
-                break;
-            }
-        }
-        best
+    fn recycle(&self, factor: Factor) {
+        self.symbolic.as_ref().expect("prepared").recycle(factor);
     }
 
     /// The null vector v = M^½ 1, normalised.
@@ -157,10 +148,17 @@ impl Component {
             wanted: n,
             detail: "the dense solver did not converge".into(),
         })?;
-        let vectors = pairs.U();
+        let u = pairs.U();
+        let mut vectors = Block::zeros(n * n.div_ceil(WIDTH));
+        for (b, block) in vectors.chunks_exact_mut(n).enumerate() {
+            for c in 0..WIDTH.min(n - WIDTH * b) {
+                block.iter_mut().enumerate().for_each(|(i, row)| row[c] = u[(i, WIDTH * b + c)]);
+            }
+        }
         Ok(Pairs {
             eigenvalues: pairs.S().column_vector().iter().map(|e| e * self.unit).collect(),
-            vectors: (0..n).flat_map(|k| (0..n).map(move |i| vectors[(i, k)])).collect(),
+            vectors,
+            places: (0..n).collect(),
             counts: Vec::new(),
             dense: true,
         })
@@ -173,16 +171,18 @@ impl Component {
         count: usize,
         tolerance: f64,
         seed: u64,
+        (kind, pool): (Kind, &Pool),
         progress: &Progress,
     ) -> Result<Pairs, EigenError> {
         if count == 1 {
-            let counts = vec![(top, 1, 1)];
             progress.add(1);
-            return Ok(Pairs { eigenvalues: vec![0.0], vectors: self.null_vector(), counts, dense: false });
+            let (vectors, counts) = (Block::zeros(self.rows()), vec![(top, 1, 1)]);
+            return Ok(Pairs { eigenvalues: vec![0.0], vectors, places: vec![0], counts, dense: false });
         }
         let mut detail = String::new();
         for attempt in 0..4 {
-            match self.attempt(top / self.unit, count, tolerance, mix(seed, attempt), attempt as usize, progress) {
+            let seed = mix(seed, attempt);
+            match self.attempt(top / self.unit, count, tolerance, (attempt as usize, seed), (kind, pool), progress) {
                 Ok(mut pairs) => {
                     pairs.eigenvalues.iter_mut().for_each(|e| *e *= self.unit);
                     pairs.counts.iter_mut().for_each(|(shift, ..)| *shift *= self.unit);
@@ -201,79 +201,99 @@ impl Component {
         top: f64,
         count: usize,
         tolerance: f64,
-        seed: u64,
-        attempt: usize,
+        (attempt, seed): (usize, u64),
+        (kind, pool): (Kind, &Pool),
         progress: &Progress,
     ) -> Result<Pairs, Trouble> {
-        let shifts = self.shifts(top, count, attempt, progress)?;
-        let mut counts: Vec<(f64, usize)> = shifts.iter().map(|shift| (shift.at, shift.below)).collect();
-        let last = shifts.len() - 1;
-        let overlap = OVERLAP << attempt;
-        let half = |between: usize| (between.div_ceil(2) + overlap).min(between);
-        let slices: Vec<Slice> = shifts
+        let symbolic = self.symbolic.as_ref().expect("prepared");
+        let weyl = Weyl::through(self.area * self.unit, top, count as f64);
+        let spans = self.spans(weyl, top, count, (attempt, seed), progress)?;
+        let tools = Tools { matrix: &self.matrix, pool, kind, progress, top, tolerance };
+
+        progress.expect_slices(spans.iter().map(|span| slices_expected(span.end - span.first)).sum());
+
+        let n = self.rows();
+        let needed: Vec<usize> = spans.iter().map(|span| blocks_needed(span.end - span.first)).collect();
+        let mut vectors = Block::zeros(n * needed.iter().sum::<usize>());
+        let mut blocks: Vec<&mut [Row]> = vectors.chunks_exact_mut(n).collect();
+        let mut shares = Vec::new();
+        let (mut rest, mut starts) = (&mut blocks[..], Vec::new());
+        for (span, needed) in spans.iter().zip(&needed) {
+            starts.push(
+                starts
+                    .last()
+                    .map_or(0, |start| start + WIDTH * shares.last().map_or(0, |(_, own): &(_, &mut [_])| own.len())),
+            );
+            let (own, after) = rest.split_at_mut(*needed);
+            shares.push((*span, own));
+            rest = after;
+        }
+        let chains: Vec<Found> = shares
             .into_par_iter()
-            .enumerate()
-            .map(|(i, shift)| {
-                if progress.stopped() {
-                    return Err(Trouble::Fatal(EigenError::Stopped));
-                }
-                let left = if i == 0 { counts[0].1 } else { half(counts[i].1 - counts[i - 1].1) };
-                let right = if i == last { count - counts[last].1 } else { half(counts[i + 1].1 - counts[i].1) };
-                let seed = mix(seed, 100 + i as u64);
-                let out_of_memory = || Trouble::Fatal(EigenError::OutOfMemory { dofs: self.rows() }); // it could be factored before
-                let factor = shift.factor.or_else(|| self.factor(shift.at)).ok_or_else(out_of_memory)?;
-                slice(&self.matrix, &factor, Demand { left, right, top, tolerance, seed }, progress)
-            })
+            .map(|(span, blocks)| chain(&tools, symbolic, weyl, span, blocks))
             .collect::<Result<_, Trouble>>()?;
+        let (eigenvalues, places) = assemble(&chains, &starts, top, tolerance)?;
+        let mut counts: Vec<(f64, usize)> = chains.iter().flat_map(|chain| chain.counts.iter().copied()).collect();
+        counts.extend(spans.iter().skip(1).map(|span| (span.border, span.border_count)));
         counts.push((top, count));
-        let (eigenvalues, vectors) = assemble(slices, top, tolerance)?;
+        counts.sort_by(|a, b| a.0.total_cmp(&b.0));
         let counts = check_counts(&eigenvalues, &counts)?;
-        Ok(Pairs { eigenvalues, vectors, counts, dense: false })
+        Ok(Pairs { eigenvalues, vectors, places, counts, dense: false })
     }
 
-    /// Chooses shifts so that every slice has about `PAIRS_A_SIDE` pairs on each side, and factors at them. Ascending.
-    fn shifts(&self, top: f64, count: usize, attempt: usize, progress: &Progress) -> Result<Vec<Shift>, Trouble> {
-        let slices = (count as f64 / (2 * PAIRS_A_SIDE) as f64).round().max(1.0);
-        let weyl = Weyl::through(self.area * self.unit, top, count as f64);
-        let spacing = top / count as f64;
-        let place = |shift: f64| {
-            if progress.stopped() {
-                return Err(Trouble::Fatal(EigenError::Stopped));
-            }
-            let shift = (shift + 0.21 * spacing * attempt as f64).min(top);
-            let factor = self
-                .factor_near(shift, spacing)
-                .ok_or_else(|| Trouble::Again(format!("no factorisation near the shift {shift:e}")))?;
-            let (at, below) = (factor.shift, factor.below);
-            Ok(Shift { at, below, factor: (self.rows() <= KEEP_FACTORS_UP_TO).then_some(factor) })
-        };
-        let wanted: Vec<f64> =
-            (0..slices as usize).map(|i| weyl.inverse((i as f64 + 0.5) * count as f64 / slices)).collect();
-        let mut shifts = wanted.into_par_iter().map(place).collect::<Result<Vec<_>, _>>()?;
-        for _ in 0..6 {
-            shifts.sort_by(|a, b| a.at.total_cmp(&b.at));
-            // Where Weyl's law was too far off, halve the interval.
-            let mut more = Vec::new();
-            for i in 0..=shifts.len() {
-                let (low, below) = i.checked_sub(1).map_or((0.0, 0), |i| (shifts[i].at, shifts[i].below));
-                let (high, above) = shifts.get(i).map_or((top, count), |shift| (shift.at, shift.below));
-                let sides = if i == 0 || i == shifts.len() { 1 } else { 2 };
-                if above.saturating_sub(below) > PAIRS_A_SIDE * sides * 17 / 10 && high - low > 1e-5 * top {
-                    more.push(0.5 * (low + high));
+    /// Chains of about equal length. Where they meet is a value at which the eigenvalues below have been counted.
+    fn spans(
+        &self,
+        weyl: Weyl,
+        top: f64,
+        count: usize,
+        (attempt, seed): (usize, u64),
+        progress: &Progress,
+    ) -> Result<Vec<Span>, Trouble> {
+        let chains = chains(count);
+        let borders = (1..chains).into_par_iter().map(|i| {
+            let number = count as f64 * i as f64 / chains as f64 + 0.3 * attempt as f64;
+            let mut at = weyl.inverse(number);
+            for _ in 0..4 {
+                progress.go_on()?;
+                if let Some(factor) = self.factor(at, progress) {
+                    let (below, growth) = (factor.below, factor.growth);
+                    self.recycle(factor);
+                    if growth < 1e6 {
+                        return Ok((at, below));
+                    }
                 }
+                at += 0.37 * top / count as f64;
             }
-            if more.is_empty() {
-                break;
-            }
-            shifts.extend(more.into_par_iter().map(place).collect::<Result<Vec<_>, _>>()?);
+            Err(Trouble::Again(format!("no factorisation near the shift {at:e}")))
+        });
+        let mut borders: Vec<(f64, usize)> = borders.collect::<Result<_, Trouble>>()?;
+        // Chains of a few pairs are not worth a start.
+        borders.retain(|&(_, below)| below > PAIRS_A_CHAIN / 3 && below + PAIRS_A_CHAIN / 3 < count);
+        borders.dedup_by(|b, a| b.1 < a.1 + PAIRS_A_CHAIN / 3);
+        let overlap = OVERLAP << attempt;
+        let mut spans = Vec::new();
+        for i in 0..=borders.len() {
+            let (border, border_count) = i.checked_sub(1).map_or((0.0, 0), |i| borders[i]);
+            let (high, end) = borders.get(i).copied().unwrap_or((top, count));
+            spans.push(Span {
+                first: border_count.saturating_sub(overlap),
+                end: (end + if i < borders.len() { overlap } else { 0 }).min(count),
+                low: border,
+                high,
+                border,
+                border_count,
+                seed: mix(seed, 100 + i as u64),
+                attempt,
+            });
         }
-        shifts.sort_by(|a, b| a.at.total_cmp(&b.at));
-        shifts.retain(|shift| shift.at < top && shift.below <= count);
-        if shifts.windows(2).any(|pair| pair[0].below > pair[1].below) || shifts.is_empty() {
-            return Err(Trouble::Again("inertia counts are not monotone".into()));
-        }
-        Ok(shifts)
+        Ok(spans)
     }
+}
+
+/// How many chains find so many pairs.
+pub(crate) fn chains(pairs: usize) -> usize {
+    (pairs as f64 / PAIRS_A_CHAIN as f64).round().max(1.0) as usize
 }
 
 /// A new seed for a part of the work (Steele, Lea and Flood 2014: SplitMix).

@@ -4,6 +4,8 @@
 //! proves that no pair is missing. The factorisation does not pivot, so the entries of L can grow when σ comes close to
 //! an eigenvalue of a leading block; `growth` and `pivot_min` say so, and the caller moves the shift.
 
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::amd;
@@ -11,9 +13,10 @@ use faer::sparse::linalg::cholesky::{self, SymbolicCholesky, SymbolicCholeskyRaw
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Par, Side};
 
-use crate::eigen::EigenError;
-use crate::eigen::block::{WIDTH, ZERO};
-use crate::eigen::solve::{Packed, Supernode};
+use crate::eigen::block::{Block, WIDTH};
+use crate::eigen::seconds::Step;
+use crate::eigen::solve::{Layout, Packed, Supernode};
+use crate::eigen::{EigenError, Progress};
 use crate::operator::Csr;
 
 /// The pattern of L, the same for every shift. `matrix` is already in elimination order.
@@ -24,6 +27,10 @@ pub(crate) struct Symbolic {
     /// Where each row's diagonal entry is.
     diagonal: Vec<usize>,
     cholesky: SymbolicCholesky<usize>,
+    layout: Arc<Layout>,
+    /// Memory of factors that are no longer in use, the library's and ours: to touch new memory is dear.
+    unpacked: Mutex<Vec<Vec<f64>>>,
+    packed: Mutex<Vec<Packed>>,
 }
 
 /// L D Lᵀ of A − σI.
@@ -59,7 +66,23 @@ impl Symbolic {
             parameters,
         )
         .map_err(|_| EigenError::OutOfMemory { dofs: n })?;
-        Ok(Symbolic { values: matrix.values.clone(), start, columns, diagonal, cholesky })
+        let mut symbolic = Symbolic {
+            values: matrix.values.clone(),
+            start,
+            columns,
+            diagonal,
+            cholesky,
+            layout: Arc::new(Layout { supernodes: Vec::new(), rows: Vec::new(), len: 0 }),
+            unpacked: Mutex::default(),
+            packed: Mutex::default(),
+        };
+        symbolic.layout = Arc::new(layout(symbolic.supernodes()));
+        Ok(symbolic)
+    }
+
+    /// Takes back the memory of a factor that is no longer needed.
+    pub(crate) fn recycle(&self, factor: Factor) {
+        lock(&self.packed).push(factor.packed);
     }
 
     fn supernodes(&self) -> &supernodal::SymbolicSupernodalCholesky<usize> {
@@ -69,8 +92,23 @@ impl Symbolic {
         }
     }
 
+    /// Bytes of the pattern.
+    pub(crate) fn bytes(&self) -> usize {
+        24 * self.values.len() + 24 * self.start.len() + 4 * self.supernodes().len_val()
+    }
+
+    /// Bytes of a factor while it is repacked: the library's, ours (a quarter larger, as groups are filled up), and a
+    /// copy of the matrix.
+    pub(crate) fn factor_bytes(&self) -> usize {
+        18 * self.supernodes().len_val() + 8 * self.values.len() + 32 * self.start.len()
+    }
+
     /// Factors A − σI; `None` if a pivot is exactly zero or the result is not finite.
-    pub(crate) fn factor(&self, shift: f64) -> Option<Factor> {
+    pub(crate) fn factor(&self, shift: f64, progress: &Progress) -> Option<Factor> {
+        progress.clock.time(Step::Factor, || self.numeric(shift))
+    }
+
+    fn numeric(&self, shift: f64) -> Option<Factor> {
         let n = self.diagonal.len();
         let mut values = self.values.clone();
         for &place in &self.diagonal {
@@ -78,7 +116,7 @@ impl Symbolic {
         }
         let supernodes = self.supernodes();
         let pattern = SymbolicSparseColMatRef::new_checked(n, n, &self.start, None, &self.columns);
-        let mut l = vec![0.0; supernodes.len_val()];
+        let mut l = lock(&self.unpacked).pop().unwrap_or_else(|| vec![0.0; supernodes.len_val()]);
         let scratch = supernodal::factorize_supernodal_numeric_ldlt_scratch::<usize, f64>(
             supernodes,
             Par::Seq,
@@ -97,33 +135,49 @@ impl Symbolic {
             Default::default(),
         )
         .ok()?;
-        let factor = pack(supernodes, &l, shift);
+        let packed = lock(&self.packed).pop().unwrap_or_else(|| Packed {
+            layout: self.layout.clone(),
+            values: Block::zeros(self.layout.len),
+            inverse: vec![0.0; n],
+        });
+        let factor = pack(supernodes, &l, shift, packed);
+        lock(&self.unpacked).push(l);
         (factor.growth.is_finite() && factor.pivot_min > 0.0).then_some(factor)
     }
 }
 
-/// Repacks the library's supernodes (column-major, D on the diagonal) for the solve, and reads the inertia off D.
-fn pack(symbolic: &supernodal::SymbolicSupernodalCholesky<usize>, l: &[f64], shift: f64) -> Factor {
+fn lock<T>(list: &Mutex<T>) -> MutexGuard<'_, T> {
+    list.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Where our solve wants the entries of the library's supernodes.
+fn layout(symbolic: &supernodal::SymbolicSupernodalCholesky<usize>) -> Layout {
     let n = symbolic.nrows();
     let mut supernodes = Vec::with_capacity(symbolic.n_supernodes());
-    let (mut values_len, mut rows) = (0, Vec::new());
+    let (mut len, mut rows) = (0, Vec::new());
     for number in 0..symbolic.n_supernodes() {
         let begin = symbolic.supernode_begin()[number];
         let width = symbolic.supernode_end()[number] - begin;
         let pattern = symbolic.supernode(number).pattern();
         let (blocks, groups) = (width.div_ceil(WIDTH), pattern.len().div_ceil(WIDTH));
         let stride = width.next_multiple_of(4);
-        let diagonal = values_len;
-        let below = diagonal + WIDTH * (blocks * (blocks + 1) / 2);
-        values_len = below + groups * stride;
+        let diagonal = len;
+        let below = diagonal + WIDTH * (blocks * (blocks - 1) / 2) + width;
+        len = below + groups * stride;
         supernodes.push(Supernode { begin, width, stride, diagonal, below, rows: rows.len(), groups });
         rows.extend(pattern.iter().map(|&row| row as u32));
         rows.resize(supernodes[number].rows + WIDTH * groups, n as u32);
     }
-    let mut values = vec![ZERO; values_len];
-    let mut inverse = vec![0.0; n];
+    Layout { supernodes, rows, len }
+}
+
+/// Repacks the library's supernodes (column-major, D on the diagonal) for the solve, and reads the inertia off D. What
+/// fills up groups is zero from the start and never written to.
+fn pack(symbolic: &supernodal::SymbolicSupernodalCholesky<usize>, l: &[f64], shift: f64, mut packed: Packed) -> Factor {
+    let layout = packed.layout.clone();
+    let (values, inverse) = (&mut packed.values[..], &mut packed.inverse);
     let (mut below, mut growth, mut pivot_min) = (0, 0.0f64, f64::INFINITY);
-    for (number, s) in supernodes.iter().enumerate() {
+    for (number, s) in layout.supernodes.iter().enumerate() {
         let height = s.width + symbolic.supernode(number).pattern().len();
         let columns = &l[symbolic.col_ptr_for_val()[number]..][..s.width * height];
         for (j, column) in columns.chunks_exact(height).enumerate() {
@@ -146,7 +200,7 @@ fn pack(symbolic: &supernodal::SymbolicSupernodalCholesky<usize>, l: &[f64], shi
             }
         }
     }
-    Factor { shift, below, growth, pivot_min, packed: Packed { supernodes, values, rows, inverse } }
+    Factor { shift, below, growth, pivot_min, packed }
 }
 
 /// An elimination order with little fill: approximate minimum degree, then a postorder of the elimination tree, so that
@@ -240,7 +294,8 @@ fn postorder(parent: &[u32]) -> Vec<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::eigen::block::{Row, dispatch};
+    use crate::eigen::block::{Row, ZERO};
+    use crate::eigen::kernel::{self, Kind};
 
     /// 2 + a diagonal, −1 to the four neighbours on a grid.
     fn grid(side: usize) -> Csr {
@@ -268,16 +323,14 @@ mod tests {
             let symbolic = Symbolic::new(&matrix).unwrap();
             for k in [0, n / 3, n - 1] {
                 let shift = if k == 0 { eigenvalues[0] - 0.1 } else { 0.5 * (eigenvalues[k - 1] + eigenvalues[k]) };
-                let factor = symbolic.factor(shift).unwrap();
+                let factor = symbolic.factor(shift, &Progress::new(&(), 0)).unwrap();
                 assert_eq!(factor.below, k);
                 let x: Vec<Row> = (0..=n)
-                    .map(|i| {
-                        Row(std::array::from_fn(|c| if i < n { ((i * 31 + c * 7) % 17) as f64 - 8.0 } else { 0.0 }))
-                    })
+                    .map(|i| std::array::from_fn(|c| if i < n { ((i * 31 + c * 7) % 17) as f64 - 8.0 } else { 0.0 }))
                     .collect();
                 let mut b = vec![ZERO; n + 1];
-                dispatch::sparse(&matrix, &x, &mut b, [1.0, -shift, 0.0]);
-                dispatch::solve(&factor.packed, &mut b);
+                kernel::sparse(Kind::best(), &matrix, &x, &mut b, [1.0, -shift, 0.0]);
+                kernel::solve(Kind::best(), &factor.packed, &mut b);
                 let distance = eigenvalues.iter().map(|l| (l - shift).abs()).fold(f64::INFINITY, f64::min);
                 for i in 0..n {
                     for c in 0..WIDTH {

@@ -1,19 +1,29 @@
 //! The lowest eigenpairs of L φ = λ M φ, with the evidence that they are right and that none is missing.
 //!
-//! In the order of the work: `component` (mass scaled out, one connected component at a time), `factor` (L D Lᵀ and
-//! inertia), `solve` (its solves), `block` (dense products), `lanczos` (one shift), `slice` (the pairs around it),
-//! `assemble` (slices to a spectrum), `spectrum` (how far each component's must go), `finish` (orthogonality, residuals),
-//! `basis` (the merge of all components, on vertices).
+//! In the order of the work: `component` (mass scaled out, one connected component at a time), `spectrum` (how far each
+//! one's spectrum must go), `factor` (L D Lᵀ and inertia), `solve` (its solves), `chain` (shifts, one after another),
+//! `slice` (the pairs around a shift), `krylov` with `projected` and `loss` (the space they are found in), `assemble`
+//! (chains to a spectrum), `finish` (orthogonality, residuals), `output` (eigenvectors on vertices), `basis` (the
+//! result). `block` and `kernel` hold what the time is spent in. `general` does all of it for a mass that is not
+//! diagonal.
 
 mod assemble;
 mod basis;
-pub(crate) mod block;
+mod block;
+mod chain;
 mod component;
 mod factor;
 mod finish;
-mod lanczos;
+mod general;
+mod kernel;
+mod krylov;
+mod loss;
+mod memory;
+mod output;
+mod projected;
+mod seconds;
 mod slice;
-pub(crate) mod solve;
+mod solve;
 mod spectrum;
 mod weyl;
 
@@ -24,8 +34,12 @@ use thiserror::Error;
 
 use crate::operator::Operator;
 pub use basis::{Certificate, Eigenbasis, InertiaCount, Method};
+use block::WIDTH;
 use component::{Component, DENSE_BELOW, DENSE_SHARE, Pairs};
 use finish::finish;
+use kernel::Kind;
+pub use seconds::Seconds;
+use seconds::{Clock, Step};
 use spectrum::{keep_lowest, lowest};
 
 /// How many eigenpairs, and how exactly.
@@ -44,11 +58,68 @@ pub struct EigenOptions {
     /// the dense solver. Default 400: a slice solves a dense problem of 250 to 300 itself. The dense solver takes
     /// O(n³) time.
     pub dense_below: usize,
+    /// How far eigenvectors may be from orthonormal. Default [`Orthogonality::Standard`].
+    pub orthogonality: Orthogonality,
+    /// Which instructions to use. Default [`Instructions::Best`]. Bytes are the same for the same instructions.
+    pub instructions: Instructions,
+    /// Bytes that may be used, with the result. Default `None`: what the system says is available, where it says so.
+    pub memory_limit: Option<usize>,
+}
+
+/// How far from orthonormal eigenvectors may be, max |Φᵀ M Φ − I|.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Orthogonality {
+    /// At most 1e-10.
+    #[default]
+    Standard,
+    /// At most 1e-12, for 3 N K² operations more.
+    Full,
+}
+
+impl Orthogonality {
+    /// The largest entry allowed.
+    fn allowed(self) -> f64 {
+        match self {
+            Orthogonality::Standard => 1e-10,
+            Orthogonality::Full => 1e-12,
+        }
+    }
+}
+
+/// Instructions of the processor that the solver's own products are compiled for.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Instructions {
+    /// The best that this processor has.
+    #[default]
+    Best,
+    /// AVX2 and FMA at most.
+    Avx2,
+    /// Those that every processor of the architecture has.
+    Portable,
+}
+
+impl Instructions {
+    fn kind(self) -> Kind {
+        match self {
+            Instructions::Best => Kind::best(),
+            Instructions::Avx2 if Kind::Avx2.is_available() => Kind::Avx2,
+            Instructions::Avx2 | Instructions::Portable => Kind::Portable,
+        }
+    }
 }
 
 impl Default for EigenOptions {
     fn default() -> EigenOptions {
-        EigenOptions { count: 500, tolerance: 1e-10, seed: 1, dense_below: DENSE_BELOW }
+        EigenOptions {
+            count: 500,
+            tolerance: 1e-10,
+            seed: 1,
+            dense_below: DENSE_BELOW,
+            orthogonality: Orthogonality::Standard,
+            instructions: Instructions::Best,
+            memory_limit: None,
+        }
     }
 }
 
@@ -56,6 +127,9 @@ impl Default for EigenOptions {
 pub trait Watch: Sync {
     /// `done` of `total` units of a stage are done.
     fn step(&self, _stage: &'static str, _done: usize, _total: usize) {}
+    /// `done` of about `expected` slices of the spectrum are done; the second grows when one has to be tried again.
+    /// Together with the seconds that have passed, an estimate of those that are left.
+    fn slices(&self, _done: usize, _expected: usize) {}
     /// Asked often; once it says true, the computation ends with [`EigenError::Stopped`].
     fn stopped(&self) -> bool {
         false
@@ -96,6 +170,16 @@ pub enum EigenError {
         /// Degrees of freedom of the component.
         dofs: usize,
     },
+    /// The computation would need more memory than there is.
+    #[error(
+        "about {needed_mb} MB are needed and {available_mb} MB may be used; ask for fewer eigenpairs, use fewer threads, or a coarser mesh"
+    )]
+    TooLittleMemory {
+        /// Expected at most, 10⁶ bytes.
+        needed_mb: usize,
+        /// The limit given, or what the system has available, 10⁶ bytes.
+        available_mb: usize,
+    },
     /// Pairs are missing after all attempts. Nothing is returned, because a spectrum with holes looks like one without.
     #[error("{found} of {wanted} eigenpairs found: {detail}; try another seed, or fewer pairs")]
     NotConverged {
@@ -131,11 +215,32 @@ pub(crate) struct Progress<'a> {
     watch: &'a dyn Watch,
     done: AtomicUsize,
     total: usize,
+    slices: AtomicUsize,
+    slices_expected: AtomicUsize,
+    pub(crate) clock: Clock,
 }
 
-impl Progress<'_> {
-    pub(crate) fn stopped(&self) -> bool {
-        self.watch.stopped()
+impl<'a> Progress<'a> {
+    pub(crate) fn new(watch: &'a dyn Watch, total: usize) -> Progress<'a> {
+        let zero = AtomicUsize::default;
+        Progress { watch, done: zero(), total, slices: zero(), slices_expected: zero(), clock: Clock::default() }
+    }
+
+    /// So many slices more are going to be computed.
+    pub(crate) fn expect_slices(&self, slices: usize) {
+        self.slices_expected.fetch_add(slices, Ordering::Relaxed);
+    }
+
+    /// A slice is done, and with it so many pairs.
+    pub(crate) fn slice(&self, pairs: usize) {
+        self.add(pairs);
+        let done = self.slices.fetch_add(1, Ordering::Relaxed) + 1;
+        self.watch.slices(done, self.slices_expected.load(Ordering::Relaxed).max(done));
+    }
+
+    /// [`EigenError::Stopped`] once the caller wants no more.
+    pub(crate) fn go_on(&self) -> Result<(), EigenError> {
+        if self.watch.stopped() { Err(EigenError::Stopped) } else { Ok(()) }
     }
 
     pub(crate) fn add(&self, pairs: usize) {
@@ -156,20 +261,24 @@ impl Progress<'_> {
 ///
 /// # Errors
 /// Pairs that cannot be found, or not to the tolerance, are an error that says so with numbers; never a shorter or
-/// poorer basis. [`EigenError::Stopped`] within about a second of [`Watch::stopped`] (a factorisation of a large mesh
-/// is not interrupted).
+/// poorer basis. [`EigenError::Stopped`] soon after [`Watch::stopped`]: it is asked before every factorisation, every
+/// solve with eight right-hand sides, and every 32 768 rows of what takes as long. A factorisation and the dense solver
+/// are not interrupted: less than a second for meshes of up to some hundred thousand vertices.
 pub fn eigenbasis(operator: &Operator, options: &EigenOptions, watch: &dyn Watch) -> Result<Eigenbasis, EigenError> {
-    let &EigenOptions { count, tolerance, seed, dense_below } = options;
-    if count == 0 {
-        return Err(EigenError::Option { option: "count", value: 0.0, expected: "at least one eigenpair" });
+    if let Some(mass) = &operator.mass_matrix {
+        let mut basis = general::eigenbasis(operator, mass, options, watch)?;
+        operator.fill_followers(&mut basis.eigenvectors);
+        return Ok(basis);
     }
-    if !(tolerance > 0.0 && tolerance < 1e-2) {
-        return Err(EigenError::Option { option: "tolerance", value: tolerance, expected: "between 0 and 0.01" });
-    }
-    let count = count.min(operator.mass.len());
-    let progress = Progress { watch, done: AtomicUsize::new(0), total: count };
+    let &EigenOptions { tolerance, seed, dense_below, orthogonality, instructions, memory_limit, .. } = options;
+    let kind = instructions.kind();
+    let count = check(options)?.min(operator.mass.len());
+    let progress = Progress::new(watch, count);
+    let clock = &progress.clock;
 
-    let mut components = split(operator)?;
+    // The result alone, before anything is built.
+    memory::check(count.saturating_mul(operator.vertex_mass.len()).saturating_mul(8), memory_limit)?;
+    let mut components = clock.time(Step::Order, || split(operator))?;
     let area: f64 = operator.mass.iter().sum();
     // The share of the pairs that Weyl's law gives a component, with a fifth to spare.
     let expected = |component: &Component| 1.2 * component.area / area * count as f64 + 2.0;
@@ -183,28 +292,48 @@ pub fn eigenbasis(operator: &Operator, options: &EigenOptions, watch: &dyn Watch
         .par_iter_mut()
         .zip(&dense)
         .filter(|(_, dense)| !**dense)
-        .try_for_each(|(component, _)| component.prepare())?;
+        .try_for_each(|(component, _)| clock.time(Step::Order, || component.prepare()))?;
 
-    let mut solved: Vec<Pairs> = lowest(&components, &dense, count, tolerance.min(1e-8), seed, &progress)?;
+    let expected = memory::expected(&components, &dense, count, operator.vertex_mass.len());
+    memory::check(expected, memory_limit)?;
+    let mut solved: Vec<Pairs> = lowest(&components, &dense, count, tolerance.min(1e-8), seed, kind, &progress)?;
     let next = keep_lowest(&mut solved, count);
     let evidence = components
         .par_iter()
         .zip(&mut solved)
-        .map(|(component, pairs)| finish(component, pairs))
+        .map(|(component, pairs)| {
+            clock.time(Step::Certify, || finish(component, pairs, orthogonality, kind, &progress))
+        })
         .collect::<Result<Vec<_>, _>>()?;
-    if progress.stopped() {
-        return Err(EigenError::Stopped);
-    }
-    let basis = basis::merge(operator, &components, &solved, &evidence, next, tolerance);
+    progress.go_on()?;
+    let mut basis =
+        clock.time(Step::Output, || basis::merge(operator, &components, solved, &evidence, next, tolerance));
+    operator.fill_followers(&mut basis.eigenvectors);
+    basis.certificate.seconds = clock.seconds();
+    basis.certificate.factorisations = clock.times(Step::Factor);
+    basis.certificate.solves = WIDTH * clock.times(Step::Solve);
+    basis.certificate.peak_bytes = expected;
     let Certificate { residual_max: residual, residual_floor: floor, orthogonality: loss, .. } = basis.certificate;
     if residual.is_nan() || residual > tolerance.max(floor) {
         return Err(EigenError::Residual { residual, tolerance, floor });
     }
-    if loss.is_nan() || loss > 1e-10 {
+    if loss.is_nan() || loss > orthogonality.allowed() {
         return Err(EigenError::NotOrthogonal { loss });
     }
     progress.add(0);
     Ok(basis)
+}
+
+/// K as asked for, once the options are in their ranges.
+fn check(options: &EigenOptions) -> Result<usize, EigenError> {
+    let &EigenOptions { count, tolerance, .. } = options;
+    if count == 0 {
+        return Err(EigenError::Option { option: "count", value: 0.0, expected: "at least one eigenpair" });
+    }
+    if !(tolerance > 0.0 && tolerance < 1e-2) {
+        return Err(EigenError::Option { option: "tolerance", value: tolerance, expected: "between 0 and 0.01" });
+    }
+    Ok(count)
 }
 
 /// The operator's connected components, each with its own rows.

@@ -1,13 +1,32 @@
 //! One slice of the spectrum: the pairs next to a shift, so many on its left and so many on its right.
 //!
-//! A slice knows from inertia counts how many pairs it has to find, and runs until it has them. It does not depend on
-//! any other slice, so slices are computed in parallel and the result is the same on any number of threads.
+//! A slice knows from an inertia count how many pairs it has to find on its left, and runs until it has them.
 
-use crate::eigen::block::{Block, ZERO, dispatch};
+use crate::eigen::block::{Pool, Row, ZERO};
 use crate::eigen::factor::Factor;
-use crate::eigen::lanczos::{Lanczos, Ritz};
+use crate::eigen::kernel::{self, Kind};
+use crate::eigen::krylov::{Handover, Krylov};
+use crate::eigen::projected::Ritz;
+use crate::eigen::seconds::Step;
 use crate::eigen::{EigenError, Progress};
 use crate::operator::Csr;
+
+/// Slices are cut apart only at a gap wider than this share of the largest eigenvalue: inside a cluster each would take
+/// its own vectors of one eigenspace, and no count could tell.
+pub(crate) const CUT_GAP: f64 = 1e-6;
+
+/// What every slice of a component works with.
+#[derive(Clone, Copy)]
+pub(crate) struct Tools<'a> {
+    pub(crate) matrix: &'a Csr,
+    pub(crate) pool: &'a Pool,
+    pub(crate) kind: Kind,
+    pub(crate) progress: &'a Progress<'a>,
+    /// The upper end of the whole range, λ_K or a little more: residuals are relative to it.
+    pub(crate) top: f64,
+    /// The residual allowed, relative to `top`.
+    pub(crate) tolerance: f64,
+}
 
 /// What a slice is asked for.
 #[derive(Debug, Clone, Copy)]
@@ -16,21 +35,28 @@ pub(crate) struct Demand {
     pub(crate) left: usize,
     /// Pairs wanted above the shift.
     pub(crate) right: usize,
-    /// The upper end of the whole range, λ_K or a little more: residuals are relative to it.
-    pub(crate) top: f64,
-    /// The residual allowed, relative to `top`.
-    pub(crate) tolerance: f64,
+    /// No slice follows: exactly `right` pairs above the shift. Otherwise about so many, up to a wide gap.
+    pub(crate) last: bool,
     /// For the random start.
     pub(crate) seed: u64,
+    /// Orthogonalise at every step.
+    pub(crate) careful: bool,
+    /// The dimension at which to look for the first time, if the slice before lets it be foreseen.
+    pub(crate) dimension: Option<usize>,
 }
 
-/// The pairs of a slice, ascending.
-pub(crate) struct Slice {
-    /// Number of the lowest pair in the component's spectrum, from 0.
-    pub(crate) first: usize,
+/// A slice that has found its pairs, and how to get at their vectors.
+pub(crate) struct Slice<'a> {
+    space: Krylov<'a>,
+    ritz: Ritz,
+    chosen: Vec<usize>,
+    /// Ritz values above the chosen ones, the closest first.
+    beyond: Vec<usize>,
+    shift: f64,
+    /// Ascending.
     pub(crate) eigenvalues: Vec<f64>,
-    /// Blocks of eight normalised vectors, ascending from the first; the last block is filled up with zeros.
-    pub(crate) vectors: Vec<Block>,
+    /// The dimension at which the pairs were there, about.
+    pub(crate) dimension: usize,
 }
 
 /// Why a computation has to be tried again, or given up.
@@ -48,135 +74,169 @@ impl From<EigenError> for Trouble {
     }
 }
 
-/// Finds `demand.left` + `demand.right` pairs around the factor's shift.
-pub(crate) fn slice(matrix: &Csr, factor: &Factor, demand: Demand, progress: &Progress) -> Result<Slice, Trouble> {
-    let Demand { left, right, seed, .. } = demand;
-    let mut found = Slice { first: factor.below - left, eigenvalues: Vec::new(), vectors: Vec::new() };
-    if left + right == 0 {
-        return Ok(found);
-    }
-    let n = matrix.rows();
-    let mut lanczos = Lanczos::new(factor, n, seed);
+/// Finds the pairs around the factor's shift.
+pub(crate) fn slice<'a>(
+    tools: &Tools<'a>,
+    factor: &'a Factor,
+    demand: Demand,
+    handover: Option<Handover>,
+) -> Result<Slice<'a>, Trouble> {
+    let Demand { left, right, last, seed, careful, dimension: foreseen } = demand;
+    let mut space = Krylov::new(*tools, factor, seed, handover, careful);
     // Measured on sheet meshes. A space a little too large costs a step, one too small another projected problem.
-    let mut next = 90 + 5 * (left + right) / 2 + left.max(right);
-    let (ritz, chosen) = loop {
-        if progress.stopped() {
-            return Err(EigenError::Stopped.into());
-        }
-        lanczos.step();
-        if lanczos.dimension() < next && lanczos.can_grow() {
+    let mut next = foreseen.unwrap_or(90 + 12 * (left + right) / 5 + left.abs_diff(right));
+    loop {
+        tools.progress.go_on()?;
+        space.step();
+        if space.dimension() < next && space.can_grow() {
             continue;
         }
-        let ritz = lanczos.ritz().ok_or_else(|| Trouble::Again("the projected problem did not converge".into()))?;
-        let (below, above) = converged(&ritz, demand);
-        if below.len() >= left && above.len() >= right {
+        let ritz = space.ritz().ok_or_else(|| Trouble::Again("the projected problem did not converge".into()))?;
+        let (below, above, all_above) = converged(&ritz, tools);
+        let eigenvalue = |&k: &usize| factor.shift + 1.0 / ritz.values[k];
+        let enough = if last { above.len() >= right } else { above.len() > right };
+        let cut = (below.len() >= left && enough)
+            .then(|| if last { Some(right) } else { cut(&above, &eigenvalue, right, CUT_GAP * tools.top) })
+            .flatten();
+        if let Some(cut) = cut {
             let mut chosen: Vec<usize> = below[..left].iter().rev().copied().collect();
-            chosen.extend(&above[..right]);
-            break (ritz, chosen);
+            chosen.extend(&above[..cut]);
+            let eigenvalues = chosen.iter().map(eigenvalue).collect();
+            // Pairs that have converged beyond those wanted say that a smaller space would have done.
+            let surplus = (below.len() - left).min(above.len() - right);
+            let (dimension, beyond) = (space.dimension().saturating_sub(2 * surplus), all_above[cut..].to_vec());
+            return Ok(Slice { space, ritz, chosen, beyond, shift: factor.shift, eigenvalues, dimension });
         }
-        let dimension = lanczos.dimension();
-        if !lanczos.can_grow() || dimension > 400 + 20 * (left + right) {
+        let dimension = space.dimension();
+        if !space.can_grow() || dimension > 400 + 20 * (left + right) {
             let (below, above, shift) = (below.len(), above.len(), factor.shift);
             return Err(Trouble::Again(format!(
                 "{below} of {left} pairs below and {above} of {right} above the shift {shift:e} after {dimension} vectors"
             )));
         }
-        let missing = left.saturating_sub(below.len()).max(right.saturating_sub(above.len()));
-        next = dimension + (8 + 3 * missing).clamp(16, 64);
-    };
-    found.eigenvalues = chosen.iter().map(|&k| factor.shift + 1.0 / ritz.values[k]).collect();
-    found.vectors = lanczos.vectors(&ritz, &chosen);
-    drop(lanczos);
-    normalise(&mut found.vectors);
-    // A tenth in hand, because λ_K lies a little below the top; and no less than rounding leaves.
-    let allowed = (0.9 * demand.tolerance * demand.top).max(ROUNDING * norm(matrix));
-    if residual(matrix, &found) > 0.5 * allowed {
-        polish(matrix, &mut found);
-        normalise(&mut found.vectors);
-        let left = residual(matrix, &found);
-        if left > allowed {
-            return Err(Trouble::Again(format!("residual {left:e}, {allowed:e} allowed")));
-        }
+        let missing = left.saturating_sub(below.len()).max((right + usize::from(!last)).saturating_sub(above.len()));
+        next = dimension + (2 * missing).clamp(8, 48);
     }
-    progress.add(chosen.len());
-    Ok(found)
 }
 
-/// Converged Ritz values below and above the shift, the closest first, up to the first that has not converged.
-fn converged(ritz: &Ritz, demand: Demand) -> (Vec<usize>, Vec<usize>) {
-    let Ritz { values, residuals, .. } = ritz;
+/// Converged Ritz values below and above the shift, the closest first, up to the first that has not converged; and all
+/// above it.
+fn converged(ritz: &Ritz, tools: &Tools) -> (Vec<usize>, Vec<usize>, Vec<usize>) {
+    let values = &ritz.values;
     let good = |&k: &usize| {
-        let (theta, beta) = (values[k].abs(), residuals[k]);
+        let (theta, beta) = (values[k].abs(), ritz.residual(k));
         // The second is the residual in A after the inverse step; the first keeps the vectors orthogonal and the
         // order of the values right.
-        beta <= 10.0 * demand.tolerance * theta && beta <= 0.1 * demand.tolerance * demand.top * theta * theta
+        beta <= 10.0 * tools.tolerance * theta && beta <= 0.3 * tools.tolerance * tools.top * theta * theta
     };
     let mut below: Vec<usize> = (0..values.len()).filter(|&k| values[k] < 0.0).collect();
     let mut above: Vec<usize> = (0..values.len()).filter(|&k| values[k] > 0.0).collect();
     below.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
     above.sort_by(|&a, &b| values[b].total_cmp(&values[a]));
-    (below.into_iter().take_while(good).collect(), above.into_iter().take_while(good).collect())
+    let converged = above.iter().copied().take_while(good).collect();
+    (below.into_iter().take_while(good).collect(), converged, above)
 }
 
-/// Scales every vector to length 1; the zeros that fill up a block stay zeros.
-fn normalise(vectors: &mut [Block]) {
-    for block in vectors {
-        let mut square = ZERO;
-        for row in block.iter() {
-            (0..8).for_each(|k| square[k] += row[k] * row[k]);
+/// How many of the pairs above the shift to take, about `right`: up to the widest gap there is among the converged.
+fn cut(above: &[usize], eigenvalue: &dyn Fn(&usize) -> f64, right: usize, least: f64) -> Option<usize> {
+    let gap = |count: usize| eigenvalue(&above[count]) - eigenvalue(&above[count - 1]);
+    let from = (right - right / 6).max(1);
+    let widest = (from..above.len()).max_by(|&a, &b| gap(a).total_cmp(&gap(b)))?;
+    (gap(widest) > least).then_some(widest)
+}
+
+impl Slice<'_> {
+    /// Eigenvalues that may lie above the slice, ascending: the nearest third have mostly converged.
+    pub(crate) fn ahead(&self) -> Vec<f64> {
+        self.beyond.iter().map(|&k| self.shift + 1.0 / self.ritz.values[k]).collect()
+    }
+
+    /// Writes the vectors into blocks of eight, the last one filled up with zeros, and makes their residuals small.
+    pub(crate) fn vectors(&self, tools: &Tools, into: &mut [&mut [Row]]) -> Result<(), Trouble> {
+        self.space.vectors(&self.ritz, &self.chosen, into)?;
+        tools.progress.clock.time(Step::Vectors, || self.settle(tools, into))
+    }
+
+    /// Polishes the vectors if their residuals ask for it.
+    fn settle(&self, tools: &Tools, into: &mut [&mut [Row]]) -> Result<(), Trouble> {
+        let Tools { matrix, kind, .. } = *tools;
+        // A tenth in hand, because λ_K lies a little below the top; and no less than rounding leaves.
+        let norm = norm(matrix);
+        let allowed = (0.9 * tools.tolerance * tools.top).max(ROUNDING * norm);
+        let residual = |into: &[&mut [Row]]| {
+            let each = into.iter().zip(self.eigenvalues.chunks(8)).map(|(x, some)| {
+                let (mut eigenvalues, mut squares) = (ZERO, ZERO);
+                eigenvalues[..some.len()].copy_from_slice(some);
+                kernel::residual(kind, matrix, x, &eigenvalues, &mut squares);
+                squares.into_iter().fold(0.0, f64::max).sqrt()
+            });
+            each.fold(0.0, f64::max)
+        };
+        let mut most = residual(into);
+        for _ in 0..POLISH_MAX {
+            if most <= 0.5 * allowed {
+                break;
+            }
+            polish(tools, norm, into, &self.eigenvalues)?;
+            most = residual(into);
         }
-        let scale = square.0.map(|square| if square > 0.0 { 1.0 / square.sqrt() } else { 0.0 });
-        for row in block.iter_mut() {
-            (0..8).for_each(|k| row[k] *= scale[k]);
+        if most.is_nan() || most > allowed {
+            return Err(Trouble::Again(format!("residual {most:e}, {allowed:e} allowed")));
         }
+        Ok(())
+    }
+
+    /// Leaves the `count` vectors above the slice (a multiple of eight, or as many as there are) to the next one.
+    pub(crate) fn hand_over(self, count: usize) -> Result<Handover, EigenError> {
+        let count = count.min(self.beyond.len());
+        self.space.hand_over(&self.ritz, &self.beyond[..count - count % 8])
     }
 }
 
-/// max ‖A x − λ x‖ over the pairs of a slice.
-fn residual(matrix: &Csr, found: &Slice) -> f64 {
-    let mut most = 0.0f64;
-    let mut y = vec![ZERO; matrix.rows()];
-    for (block, eigenvalues) in found.vectors.iter().zip(found.eigenvalues.chunks(8)) {
-        dispatch::sparse(matrix, block, &mut y, [1.0, 0.0, 0.0]);
-        for (k, eigenvalue) in eigenvalues.iter().enumerate() {
-            let square: f64 = block.iter().zip(&y).map(|(x, y)| (y[k] - eigenvalue * x[k]).powi(2)).sum();
-            most = most.max(square.sqrt());
-        }
-    }
-    most
-}
-
-/// What rounding can leave of a residual, relative to ‖A‖.
+/// What rounding leaves of a residual, relative to ‖A‖: 4e-16 for a product with A, times what solves near an
+/// eigenvalue lose.
 pub(crate) const ROUNDING: f64 = 8.0 * 4e-16;
+
+/// How often vectors are polished, at most: each time takes a digit of the noise away.
+const POLISH_MAX: usize = 3;
 
 /// Degree of the polishing polynomial; 3 to 5 serve.
 const POLISH_DEGREE: usize = 4;
 
 /// x ← T_d(t(A)) x / T_d(t(λ)) with the Chebyshev polynomial T_d, t mapping [‖A‖/8, ‖A‖] to [−1, 1]: damps the rounding
 /// noise at the upper end of the spectrum, which the residual multiplies by ‖A‖/λ_K, and leaves the pair alone.
-fn polish(matrix: &Csr, found: &mut Slice) {
-    let high = norm(matrix);
+fn polish(tools: &Tools, high: f64, vectors: &mut [&mut [Row]], eigenvalues: &[f64]) -> Result<(), EigenError> {
+    let Tools { matrix, pool, kind, .. } = *tools;
+    let n = matrix.rows();
     let (centre, half) = (high * (1.0 + 0.125) / 2.0, high * (1.0 - 0.125) / 2.0);
-    let mut scratch = [vec![ZERO; matrix.rows()], vec![ZERO; matrix.rows()]];
-    for (block, eigenvalues) in found.vectors.iter_mut().zip(found.eigenvalues.chunks(8)) {
-        let [y, z] = &mut scratch;
-        dispatch::sparse(matrix, block, y, [1.0 / half, -centre / half, 0.0]);
+    let mut scratch = pool.take(n + 1);
+    for (block, eigenvalues) in vectors.iter_mut().zip(eigenvalues.chunks(8)) {
+        tools.progress.go_on()?;
+        let [mut before, mut now]: [&mut [Row]; 2] = [block, &mut scratch[..n]];
+        kernel::sparse(kind, matrix, before, now, [1.0 / half, -centre / half, 0.0]);
         for _ in 1..POLISH_DEGREE {
-            z.copy_from_slice(block);
-            dispatch::sparse(matrix, y, z, [2.0 / half, -2.0 * centre / half, -1.0]);
-            std::mem::swap(block, y);
-            std::mem::swap(y, z);
+            // T_{d+1} = 2 t T_d − T_{d−1}, in place of T_{d−1}.
+            kernel::sparse(kind, matrix, now, before, [2.0 / half, -2.0 * centre / half, -1.0]);
+            [before, now] = [now, before];
         }
-        std::mem::swap(block, y);
+        let mut scale = ZERO;
         for (k, eigenvalue) in eigenvalues.iter().enumerate() {
             let t = (eigenvalue - centre) / half;
             let (mut before, mut value) = (1.0, t);
             for _ in 1..POLISH_DEGREE {
                 (before, value) = (value, 2.0 * t * value - before);
             }
-            block.iter_mut().for_each(|row| row[k] /= value);
+            scale[k] = 1.0 / value;
+        }
+        for (x, y) in before.iter_mut().zip(now.iter_mut()) {
+            for k in 0..8 {
+                let value = y[k] * scale[k];
+                (x[k], y[k]) = (value, value); // one of them is the block
+            }
         }
     }
+    pool.give([scratch]);
+    Ok(())
 }
 
 /// An upper bound of A's largest eigenvalue: the largest sum of |entries| of a row (Gershgorin).

@@ -4,7 +4,10 @@
 //! rows' entries of one column, so that every inner loop is "eight entries of L times a row of x" on whole cache
 //! lines, and the index of a row is read once for eight right-hand sides.
 
-use crate::eigen::block::{Arithmetic, Row, SMALL_ZERO, Small, WIDTH, ZERO, add_scaled, outer};
+use std::sync::Arc;
+
+use crate::eigen::block::{Block, Row, SMALL_ZERO, Small, WIDTH, ZERO};
+use crate::eigen::kernel::{Arithmetic, add_scaled, prefetch};
 
 /// Columns `begin..begin + width` of L, which share the rows below them.
 pub(crate) struct Supernode {
@@ -12,7 +15,8 @@ pub(crate) struct Supernode {
     pub(crate) width: usize,
     /// `width`, rounded up to a multiple of 4: columns a group of rows is stored with.
     pub(crate) stride: usize,
-    /// Where its diagonal block starts in `values`: group g of eight rows takes 8 (g + 1) columns.
+    /// Where its diagonal block starts in `values`: group g of eight rows takes 8 (g + 1) columns, the last one no
+    /// more than there are.
     pub(crate) diagonal: usize,
     /// Where the rows below start in `values`: `stride` columns a group.
     pub(crate) below: usize,
@@ -21,52 +25,87 @@ pub(crate) struct Supernode {
     pub(crate) groups: usize,
 }
 
-/// L, unit lower triangular, and D⁻¹, packed for [`solve_with`].
-pub(crate) struct Packed {
+/// Where the entries of L are, the same for every factor of one pattern.
+pub(crate) struct Layout {
     pub(crate) supernodes: Vec<Supernode>,
-    pub(crate) values: Vec<Row>,
     /// Row numbers in groups of eight; the last group of a supernode is filled up with n, a row of its own in x.
     pub(crate) rows: Vec<u32>,
+    /// Rows of 64 bytes.
+    pub(crate) len: usize,
+}
+
+/// L, unit lower triangular, and D⁻¹, packed for [`solve_with`].
+pub(crate) struct Packed {
+    pub(crate) layout: Arc<Layout>,
+    pub(crate) values: Block,
     /// 1 / D.
     pub(crate) inverse: Vec<f64>,
 }
 
 impl Supernode {
-    /// Group g of eight rows of the diagonal block: 8 (g + 1) columns, of which the last eight are triangular.
+    /// Where group g of eight rows of the diagonal block starts in `values`: 8 (g + 1) columns, of which the last
+    /// eight are triangular.
     #[inline(always)]
-    fn diagonal_group<'a>(&self, values: &'a [Row], group: usize) -> (&'a [Row], &'a [Row]) {
-        let start = self.diagonal + WIDTH * (group * (group + 1) / 2);
-        values[start..start + WIDTH * (group + 1)].split_at(WIDTH * group)
+    fn diagonal_start(&self, group: usize) -> usize {
+        self.diagonal + WIDTH * (group * (group + 1) / 2)
     }
 }
 
 /// X = (L D Lᵀ)⁻¹ X in place. `x` has n + 1 rows, the last of them scratch.
 #[inline(always)]
-pub(crate) fn solve_with<A: Arithmetic>(factor: &Packed, x: &mut [Row]) {
+pub(crate) fn solve_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>(
+    factor: &Packed,
+    x: &mut [Row],
+) {
     if let Some(scratch) = x.last_mut() {
         *scratch = ZERO;
     }
-    for supernode in &factor.supernodes {
-        forward::<A>(factor, supernode, x);
+    for supernode in &factor.layout.supernodes {
+        forward::<A, HIGH>(factor, supernode, x);
     }
     if let Some(scratch) = x.last_mut() {
         *scratch = ZERO;
     }
-    for supernode in factor.supernodes.iter().rev() {
-        backward::<A>(factor, supernode, x);
+    for (number, supernode) in factor.layout.supernodes.iter().enumerate().rev() {
+        prefetch_backward(factor, number, x);
+        backward::<A, HIGH>(factor, supernode, x);
     }
+}
+
+/// How far ahead of its use the factor is asked for, in rows of 64 bytes.
+const AHEAD: usize = 128;
+
+/// Σ_j l_j xⱼᵀ over the columns of a group of eight rows of L, HIGH rows at once.
+#[inline(always)]
+fn group<A: Arithmetic, const HIGH: usize>(values: &[Row], first: usize, x: &[Row]) -> Small {
+    let mut out = SMALL_ZERO;
+    let l = &values[first..first + x.len()];
+    for high in (0..WIDTH).step_by(HIGH) {
+        let mut sum = [ZERO; HIGH];
+        for (j, (l, x)) in l.iter().zip(x).enumerate() {
+            if high == 0 {
+                prefetch(values, first + j + AHEAD);
+            }
+            for r in 0..HIGH {
+                add_scaled::<A>(&mut sum[r], l[high + r], x);
+            }
+        }
+        out[high..high + HIGH].copy_from_slice(&sum);
+    }
+    out
 }
 
 /// L y = x for the columns of one supernode.
 #[inline(always)]
-fn forward<A: Arithmetic>(factor: &Packed, s: &Supernode, x: &mut [Row]) {
+fn forward<A: Arithmetic, const HIGH: usize>(factor: &Packed, s: &Supernode, x: &mut [Row]) {
     let (head, tail) = x.split_at_mut(s.begin + s.width);
     let own = &mut head[s.begin..];
-    for group in 0..s.width.div_ceil(WIDTH) {
-        let (left, triangle) = s.diagonal_group(&factor.values, group);
-        let known = outer::<A>(left, &own[..WIDTH * group]);
-        let rows = (s.width - WIDTH * group).min(WIDTH);
-        let own = &mut own[WIDTH * group..][..rows];
+    for g in 0..s.width.div_ceil(WIDTH) {
+        let start = s.diagonal_start(g);
+        let known = group::<A, HIGH>(&factor.values, start, &own[..WIDTH * g]);
+        let rows = (s.width - WIDTH * g).min(WIDTH);
+        let triangle = &factor.values[start + WIDTH * g..][..rows];
+        let own = &mut own[WIDTH * g..][..rows];
         for (own, known) in own.iter_mut().zip(&known) {
             for k in 0..WIDTH {
                 own[k] -= known[k];
@@ -75,14 +114,17 @@ fn forward<A: Arithmetic>(factor: &Packed, s: &Supernode, x: &mut [Row]) {
         for j in 0..rows {
             let (solved, rest) = own.split_at_mut(j + 1);
             for (r, own) in rest.iter_mut().enumerate() {
-                add_scaled::<A>(&mut own.0, -triangle[j][j + 1 + r], &solved[j].0);
+                add_scaled::<A>(own, -triangle[j][j + 1 + r], &solved[j]);
             }
         }
     }
     let first = s.begin + s.width;
-    for group in 0..s.groups {
-        let known = outer::<A>(&factor.values[s.below + group * s.stride..][..s.width], own);
-        let rows = &factor.rows[s.rows + WIDTH * group..][..WIDTH];
+    for g in 0..s.groups {
+        let rows = &factor.layout.rows[s.rows + WIDTH * g..][..WIDTH];
+        for &row in rows {
+            prefetch(tail, row as usize - first);
+        }
+        let known = group::<A, HIGH>(&factor.values, s.below + g * s.stride, own);
         for r in 0..WIDTH {
             let row = &mut tail[rows[r] as usize - first];
             for k in 0..WIDTH {
@@ -94,21 +136,22 @@ fn forward<A: Arithmetic>(factor: &Packed, s: &Supernode, x: &mut [Row]) {
 
 /// Lᵀ y = D⁻¹ x for the columns of one supernode.
 #[inline(always)]
-fn backward<A: Arithmetic>(factor: &Packed, s: &Supernode, x: &mut [Row]) {
+fn backward<A: Arithmetic, const HIGH: usize>(factor: &Packed, s: &Supernode, x: &mut [Row]) {
     for (row, inverse) in x[s.begin..s.begin + s.width].iter_mut().zip(&factor.inverse[s.begin..]) {
-        for k in 0..WIDTH {
-            row[k] *= inverse;
-        }
+        row.iter_mut().for_each(|x| *x *= inverse);
     }
-    for group in (0..s.width.div_ceil(WIDTH)).rev() {
-        let known = if s.stride - WIDTH * group >= WIDTH {
-            above::<A, 8>(factor, s, group, x)
+    for g in (0..s.width.div_ceil(WIDTH)).rev() {
+        let columns = (s.width - WIDTH * g).min(WIDTH);
+        let mut known = SMALL_ZERO;
+        if HIGH == WIDTH && columns > WIDTH / 2 {
+            known = above::<A, 8>(factor, s, g, 0, x);
         } else {
-            above::<A, 4>(factor, s, group, x)
-        };
-        let (_, triangle) = s.diagonal_group(&factor.values, group);
-        let columns = (s.width - WIDTH * group).min(WIDTH);
-        let own = &mut x[s.begin + WIDTH * group..][..columns];
+            for high in (0..columns).step_by(4) {
+                known[high..high + 4].copy_from_slice(&above::<A, 4>(factor, s, g, high, x)[..4]);
+            }
+        }
+        let triangle = &factor.values[s.diagonal_start(g) + WIDTH * g..][..columns];
+        let own = &mut x[s.begin + WIDTH * g..][..columns];
         for (own, known) in own.iter_mut().zip(&known) {
             for k in 0..WIDTH {
                 own[k] -= known[k];
@@ -117,35 +160,61 @@ fn backward<A: Arithmetic>(factor: &Packed, s: &Supernode, x: &mut [Row]) {
         for j in (0..columns).rev() {
             let (own, solved) = own.split_at_mut(j + 1);
             for (r, solved) in solved.iter().enumerate() {
-                add_scaled::<A>(&mut own[j].0, -triangle[j][j + 1 + r], &solved.0);
+                add_scaled::<A>(&mut own[j], -triangle[j][j + 1 + r], solved);
             }
         }
     }
 }
 
-/// Lᵀ x over all rows below a group of columns, the first `COLUMNS` of the eight.
+/// Lᵀ x over all rows below a group of columns: `COLUMNS` of them, from number `high` of the group.
 #[inline(always)]
-fn above<A: Arithmetic, const COLUMNS: usize>(factor: &Packed, s: &Supernode, group: usize, x: &[Row]) -> Small {
-    let mut sum = SMALL_ZERO;
+fn above<A: Arithmetic, const COLUMNS: usize>(
+    factor: &Packed,
+    s: &Supernode,
+    group: usize,
+    high: usize,
+    x: &[Row],
+) -> [Row; COLUMNS] {
+    let mut sum = [ZERO; COLUMNS];
+    let column = WIDTH * group + high;
     for g in 0..s.groups {
-        let l = &factor.values[s.below + g * s.stride + WIDTH * group..][..COLUMNS];
-        let rows = &factor.rows[s.rows + WIDTH * g..][..WIDTH];
+        let start = s.below + g * s.stride + column;
+        let l = &factor.values[start..start + COLUMNS];
+        let rows = &factor.layout.rows[s.rows + WIDTH * g..][..WIDTH];
+        let later = &factor.layout.rows[s.rows + WIDTH * (g + 4).min(s.groups - 1)..][..WIDTH];
         for r in 0..WIDTH {
-            let x = &x[rows[r] as usize].0;
+            if r < COLUMNS {
+                prefetch(&factor.values, start + 4 * s.stride + r);
+            }
+            prefetch(x, later[r] as usize);
+            let x = &x[rows[r] as usize];
             for q in 0..COLUMNS {
                 add_scaled::<A>(&mut sum[q], l[q][r], x);
             }
         }
     }
     for g in group + 1..s.width.div_ceil(WIDTH) {
-        let (left, _) = s.diagonal_group(&factor.values, g);
-        let l = &left[WIDTH * group..][..COLUMNS];
+        let l = &factor.values[s.diagonal_start(g) + column..][..COLUMNS];
         let rows = (s.width - WIDTH * g).min(WIDTH);
         for (r, x) in x[s.begin + WIDTH * g..][..rows].iter().enumerate() {
             for q in 0..COLUMNS {
-                add_scaled::<A>(&mut sum[q], l[q][r], &x.0);
+                add_scaled::<A>(&mut sum[q], l[q][r], x);
             }
         }
     }
     sum
+}
+
+/// Asks for the first lines that a supernode's part of the second sweep will read.
+#[inline(always)]
+fn prefetch_backward(factor: &Packed, number: usize, x: &[Row]) {
+    let Some(far) = number.checked_sub(3) else { return };
+    let start = factor.layout.supernodes[far].diagonal;
+    for line in start..factor.layout.supernodes[far + 1].diagonal.min(start + 64) {
+        prefetch(&factor.values, line);
+    }
+    let near = &factor.layout.supernodes[number - 1];
+    for row in &factor.layout.rows[near.rows..][..(WIDTH * near.groups).min(32)] {
+        prefetch(x, *row as usize);
+    }
 }

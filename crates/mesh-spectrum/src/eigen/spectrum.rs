@@ -5,7 +5,9 @@
 
 use rayon::prelude::*;
 
+use crate::eigen::block::Pool;
 use crate::eigen::component::{Component, DENSE_SHARE, Pairs, mix};
+use crate::eigen::kernel::Kind;
 use crate::eigen::weyl::Weyl;
 use crate::eigen::{EigenError, Progress};
 
@@ -16,12 +18,11 @@ pub(crate) fn lowest(
     count: usize,
     tolerance: f64,
     seed: u64,
+    kind: Kind,
     progress: &Progress,
 ) -> Result<Vec<Pairs>, EigenError> {
     let solve_dense = |component: &Component| {
-        if progress.stopped() {
-            return Err(EigenError::Stopped);
-        }
+        progress.go_on()?;
         component.solve_dense()
     };
     let mut solved: Vec<Option<Pairs>> = components
@@ -47,7 +48,11 @@ pub(crate) fn lowest(
                 progress.add(below);
                 Ok(pairs)
             }
-            None => component.solve_sliced(top, below, tolerance, mix(seed, number as u64), progress),
+            None => {
+                // Components are of different sizes, so each has blocks of its own.
+                let tools = (kind, &Pool::default());
+                component.solve_sliced(top, below, tolerance, mix(seed, number as u64), tools, progress)
+            }
         })
         .collect()
 }
@@ -80,15 +85,13 @@ fn top(
     let (mut low, mut high) = (0.0, 2.0 * components.iter().map(|component| component.norm).fold(0.0, f64::max));
     let mut at = Weyl::closed(area).inverse(wanted as f64).min(0.5 * high);
     for round in 0..200 {
-        if progress.stopped() {
-            return Err(EigenError::Stopped);
-        }
+        progress.go_on()?;
         let counts: Option<Vec<usize>> = components
             .par_iter()
             .zip(solved)
             .map(|(component, solved)| match solved {
                 Some(pairs) => Some(pairs.eigenvalues.iter().filter(|&&e| e < at).count()),
-                None => component.count_below(at),
+                None => component.count_below(at, progress),
             })
             .collect();
         let Some(below) = counts else {
@@ -141,8 +144,7 @@ pub(crate) fn keep_lowest(solved: &mut [Pairs], count: usize) -> Option<f64> {
 
 impl Pairs {
     fn truncate(&mut self, count: usize) {
-        let rows = self.vectors.len() / self.eigenvalues.len().max(1);
         self.eigenvalues.truncate(count);
-        self.vectors.truncate(count * rows);
+        self.places.truncate(count);
     }
 }

@@ -177,8 +177,9 @@ function studyFacts() {
   const rows = [
     ["Reference", study.reference && runById.has(study.reference) ? runLink(study.reference) : study.reference],
     ["Mesh", study.vertices && `${plural(study.vertices, "vertex", "vertices")}, ${plural(study.triangles ?? 0, "triangle")}${missing(study.area) ? "" : `, area ${withUnit(study.area, lengthUnit && `${lengthUnit}²`, 6)}`}`],
-    ["Separate pieces", missing(study.components) ? null : `${study.components}${study.joined ? `; vertices of different pieces up to ${withUnit(study.joined)} apart were joined` : study.components > 1 ? ", not joined" : ""}`],
+    ["Separate pieces", missing(study.components) ? null : `${study.components}${study.joined ? `; vertices of different pieces up to ${withUnit(study.joined)} apart were joined` : study.joined_by_deck ? `; ${study.joined_by_deck}` : study.components > 1 ? ", not joined" : ""}`],
     ["Joining", study.join_advice],
+    ["Operator", study.operator && `${study.operator}, ${study.mass} mass`],
     ["Eigenvectors", study.eigenpairs && `${count(study.eigenpairs)}${study.complete === true ? ", certified: none is missing" : study.complete === false ? "; some may be missing" : ""}`],
     ["Accuracy", missing(study.residual) ? null : `largest residual ${number(study.residual, 2)} as stored, in single precision${missing(study.orthogonality) ? "" : `, orthogonal within ${number(study.orthogonality, 2)}`}`],
     ["Captured", missing(study.captured_min) ? null : `at least ${shareText(study.captured_min, 2)} of the displacement of each run`],

@@ -1,0 +1,71 @@
+//! A surface from any file: mesh files (OBJ, PLY, STL, OFF, VTU) by `mesh-files`, result files by [`run`](crate::run).
+//!
+//! For whoever wants eigenpairs without a study. Vertices that no face uses are dropped, because nothing determines a
+//! field there; where each vertex stood in the file is kept.
+
+use std::path::Path;
+
+use mesh_spectrum::Mesh;
+
+use crate::Error;
+use crate::reference::Reference;
+use crate::run::Run;
+
+/// A mesh and where it is from.
+#[derive(Debug, Clone)]
+pub struct Surface {
+    /// The mesh, in the model's length unit, without unused vertices.
+    pub mesh: Mesh,
+    /// N: the number of each vertex in the mesh file, from 0, or the user id of its node in a result file.
+    pub vertex_ids: Vec<u64>,
+    /// Vertices that no face uses, which were dropped (a result file's other nodes are not counted).
+    pub unused_vertices: usize,
+    /// What was in the file and was not read, for the user.
+    pub notes: Vec<String>,
+}
+
+impl Surface {
+    /// Reads the surface of a mesh file, or the undeformed shells of a result file or of its folder (of the parts named;
+    /// all when none is).
+    ///
+    /// # Errors
+    /// [`Error::NoSuchPath`], [`Error::MeshFile`], [`Error::Mesh`], and those of [`Run::open`] and [`Reference::of_run`].
+    pub fn read(path: &Path, parts: &[String]) -> Result<Surface, Error> {
+        if !path.exists() {
+            return Err(Error::NoSuchPath(path.to_owned()));
+        }
+        if path.is_dir() || mesh_files::format_of(path).is_none() {
+            match Run::open(path.display().to_string(), path) {
+                Ok(run) => return Surface::of_run(&run, parts),
+                // A deck by its name, whose fault is known.
+                Err(error @ Error::Deck(_)) => return Err(error),
+                // Its first bytes may still say what it is.
+                Err(error) if path.is_dir() || has_the_name_of_a_run(path) => return Err(error),
+                Err(_) => {}
+            }
+        }
+        if let Some(part) = parts.first() {
+            let expected = "no --part: a mesh file has no parts".into();
+            return Err(Error::Value { name: "--part", value: part.clone(), expected });
+        }
+        let file = mesh_files::read(path).map_err(Error::MeshFile)?;
+        let wrong = |source| Error::BadMesh { path: path.to_owned(), source };
+        let whole = Mesh::from_polygons(file.vertices.clone(), file.faces()).map_err(wrong)?;
+        let (mesh, kept) = whole.without_unused_vertices();
+        Ok(Surface {
+            unused_vertices: file.vertices.len() - kept.len(),
+            vertex_ids: kept.into_iter().map(u64::from).collect(),
+            mesh,
+            notes: file.notes,
+        })
+    }
+
+    fn of_run(run: &Run, parts: &[String]) -> Result<Surface, Error> {
+        let Reference { mesh, node_ids, .. } = Reference::of_run(run, parts)?;
+        Ok(Surface { mesh, vertex_ids: node_ids, unused_vertices: 0, notes: run.warnings() })
+    }
+}
+
+fn has_the_name_of_a_run(path: &Path) -> bool {
+    path.file_name().is_some_and(|name| name.to_string_lossy().to_ascii_lowercase().contains("d3plot"))
+}

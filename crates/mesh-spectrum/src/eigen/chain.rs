@@ -1,0 +1,209 @@
+//! A chain of slices, from one known count of eigenvalues to another, each slice starting with what the one before it
+//! was left with.
+//!
+//! The first shift comes from Weyl's law, each later one from the Ritz values that the slice before has not used. A
+//! shift lies in the widest gap near its place, so that it does not cut a cluster.
+
+use crate::eigen::block::{Row, WIDTH};
+use crate::eigen::component::mix;
+use crate::eigen::factor::{Factor, Symbolic};
+use crate::eigen::krylov::Handover;
+use crate::eigen::slice::{CUT_GAP, Demand, Tools, Trouble, slice};
+use crate::eigen::weyl::Weyl;
+
+/// Pairs on either side of a shift. Fewer: more factorisations; more: larger spaces. Between 28 and 40 the time is flat.
+pub(crate) const PAIRS_A_SIDE: usize = 32;
+
+/// Ritz vectors handed over, for each pair on a side: those that the next slice finds again, and those that help.
+const HAND_OVER: usize = 3;
+
+/// The largest |L| and the smallest |D| (in mean spacings of eigenvalues) a shift is used with: above and below, the
+/// solve loses digits (measured: 10 % of the shifts are moved).
+const GROWTH_MAX: f64 = 1e4;
+const PIVOT_MIN: f64 = 5e-3;
+
+/// What a chain has to find.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Span {
+    /// The number of the first pair, from 0.
+    pub(crate) first: usize,
+    /// One more than the number of the last.
+    pub(crate) end: usize,
+    /// A value below which there are no more than `first` eigenvalues, and one below which there are at least `end`.
+    pub(crate) low: f64,
+    pub(crate) high: f64,
+    /// Where it meets the chain before, and the eigenvalues below that.
+    pub(crate) border: f64,
+    pub(crate) border_count: usize,
+    pub(crate) seed: u64,
+    /// 0, or how often it has gone wrong: shifts are moved, and from then on nothing is left to an estimate.
+    pub(crate) attempt: usize,
+}
+
+/// What a chain has found.
+#[derive(Debug)]
+pub(crate) struct Found {
+    /// The number of the first pair.
+    pub(crate) first: usize,
+    /// Ascending.
+    pub(crate) eigenvalues: Vec<f64>,
+    /// Where each one's vector is: 8 × block + column.
+    pub(crate) places: Vec<usize>,
+    /// Shifts, and the eigenvalues below each by inertia.
+    pub(crate) counts: Vec<(f64, usize)>,
+}
+
+/// Blocks that a chain for so many pairs may use: the last block of every slice is not full.
+pub(crate) fn blocks_needed(pairs: usize) -> usize {
+    pairs.div_ceil(WIDTH) + slices_max(pairs)
+}
+
+/// About so many slices find so many pairs.
+pub(crate) fn slices_expected(pairs: usize) -> usize {
+    ((pairs as f64 / (2 * PAIRS_A_SIDE) as f64).round() as usize).max(1)
+}
+
+fn slices_max(pairs: usize) -> usize {
+    pairs / PAIRS_A_SIDE + 4
+}
+
+/// Finds the pairs of a span and writes their vectors into `blocks`.
+pub(crate) fn chain(
+    tools: &Tools,
+    symbolic: &Symbolic,
+    weyl: Weyl,
+    span: Span,
+    mut blocks: &mut [&mut [Row]],
+) -> Result<Found, Trouble> {
+    let Span { first, end, low, high, seed, attempt, border: _, border_count: _ } = span;
+    let careful = attempt > 0;
+    let mut found = Found { first, eigenvalues: Vec::new(), places: Vec::new(), counts: Vec::new() };
+    let mut next_block = 0;
+    let mut ahead: Vec<f64> = Vec::new();
+    let mut handover: Option<Handover> = None;
+    let mut dimension: Option<usize> = None;
+    let (mut below, mut low) = (first, low);
+    for number in 0..slices_max(end - first) {
+        let left_over = end - below;
+        let slices = slices_expected(left_over);
+        let half = left_over.div_ceil(2 * slices).max(2);
+        let wanted = guess(&ahead, half).unwrap_or_else(|| {
+            let place = weyl.inverse((below + half) as f64) - weyl.inverse(below as f64);
+            (low + place).min(0.5 * (low + high))
+        });
+        let seed = mix(seed, number as u64);
+        let factor = place_shift(tools, symbolic, wanted, (below, half), (low, high), attempt)?;
+        let nu = factor.below;
+        found.counts.push((factor.shift, nu));
+        let left = nu.min(end) - below;
+        let last = slices == 1 || nu + left.max(half) + half / 3 >= end;
+        let right = if last { end.saturating_sub(nu) } else { left.max(half).min(end - nu) };
+        let demand = Demand { left: nu - below, right, last, seed, careful, dimension };
+        let slice = slice(tools, &factor, demand, handover.take())?;
+        // What a slice needed is what the next one will need; the first one, without a hand-over, needs more.
+        dimension = Some(if number == 0 { slice.dimension * 4 / 5 } else { slice.dimension });
+
+        // The slice before knew which eigenvalue comes next. Another one here means that one of both missed a pair.
+        let near = |a: f64, b: f64| (a - b).abs() <= 10.0 * tools.tolerance * tools.top;
+        if let (Some(&expected), Some(&seen)) = (ahead.first(), slice.eigenvalues.first())
+            && !near(expected, seen)
+        {
+            return Err(Trouble::Again(format!(
+                "eigenvalue {below} is {expected:e} from one shift and {seen:e} from the next: one is missing"
+            )));
+        }
+        let count = slice.eigenvalues.len();
+        let used = count.div_ceil(WIDTH);
+        if used > blocks.len() {
+            return Err(Trouble::Again("more slices than foreseen".into()));
+        }
+        let (own, rest) = blocks.split_at_mut(used);
+        slice.vectors(tools, own)?;
+        blocks = rest;
+        found.places.extend((0..count).map(|k| WIDTH * next_block + k));
+        found.eigenvalues.extend(&slice.eigenvalues);
+        next_block += used;
+        below += count;
+        tools.progress.slice(count.min(left + right));
+        if last {
+            found.eigenvalues.truncate(end - first);
+            found.places.truncate(end - first);
+            return Ok(found);
+        }
+        low = found.eigenvalues.last().copied().unwrap_or(low);
+        ahead = slice.ahead();
+        if careful {
+            drop(slice);
+        } else {
+            handover = Some(slice.hand_over(HAND_OVER * half)?);
+        }
+        symbolic.recycle(factor);
+    }
+    Err(Trouble::Again("more slices than foreseen".into()))
+}
+
+/// The middle of the widest gap near the place of number `half` among values that may be eigenvalues.
+fn guess(ahead: &[f64], half: usize) -> Option<f64> {
+    let reliable = &ahead[..ahead.len() * 2 / 3];
+    if reliable.len() < half + 2 {
+        return None;
+    }
+    let (from, to) = ((half - half / 6).max(1), (half + half / 6).min(reliable.len() - 1));
+    let gap = |k: usize| reliable[k] - reliable[k - 1];
+    let widest = (from..=to).max_by(|&a, &b| gap(a).total_cmp(&gap(b)))?;
+    Some(0.5 * (reliable[widest] + reliable[widest - 1]))
+}
+
+/// Factors at a shift near the one wanted that has about `half` more eigenvalues below it than `below`, and is no
+/// closer to one of them than is good for the factor.
+fn place_shift(
+    tools: &Tools,
+    symbolic: &Symbolic,
+    wanted: f64,
+    (below, half): (usize, usize),
+    (mut low, mut high): (f64, f64),
+    attempt: usize,
+) -> Result<Factor, Trouble> {
+    let spacing = (wanted - low).max(1e-9 * tools.top) / half as f64;
+    let mut shift = (wanted + 0.21 * spacing * attempt as f64).min(high);
+    let mut best: Option<Factor> = None;
+    let (mut narrow, mut usable) = (false, 0);
+    for _ in 0..60 {
+        tools.progress.go_on()?;
+        let Some(factor) = symbolic.factor(shift, tools.progress) else {
+            shift += 0.013 * spacing;
+            continue;
+        };
+        let nu = factor.below;
+        let good = factor.growth < GROWTH_MAX && factor.pivot_min > PIVOT_MIN * spacing;
+        if nu <= below || (nu - below > 2 * half + 8 && !narrow) {
+            symbolic.recycle(factor);
+            if best.is_some() {
+                break;
+            }
+            if nu <= below {
+                low = shift
+            } else {
+                high = shift
+            }
+            // Newton's method on the counting function, or halving the bracket.
+            let newton = shift + ((below + half) as f64 - nu as f64) * spacing;
+            shift = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+            if high - low < CUT_GAP * tools.top {
+                (narrow, shift) = (true, high + CUT_GAP * tools.top); // a cluster larger than a slice: take it whole
+            }
+            continue;
+        }
+        if best.as_ref().is_none_or(|best| factor.growth / factor.pivot_min < best.growth / best.pivot_min) {
+            best.replace(factor).into_iter().for_each(|worse| symbolic.recycle(worse));
+        } else {
+            symbolic.recycle(factor);
+        }
+        usable += 1;
+        if good || usable >= 4 {
+            break;
+        }
+        shift += 0.37 * spacing;
+    }
+    best.ok_or_else(|| Trouble::Again(format!("no factorisation near the shift {wanted:e}")))
+}

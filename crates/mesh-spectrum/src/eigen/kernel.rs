@@ -1,0 +1,421 @@
+//! The products that the solver spends its time in, each written once and compiled three times.
+//!
+//! Which kind runs is decided at run time ([`Kind::best`]): AVX-512, AVX2 (both with fused multiply-add), or portable
+//! code. The two fused kinds add in the same order and give the same bytes; the portable one rounds products too.
+//!
+//! Tall blocks do not fit in any cache, so every product reads each of them once, panel by panel, for as many columns
+//! as the registers hold; the lines that come next are asked for ahead of time.
+
+use crate::eigen::block::{Row, SMALL_ZERO, Small, WIDTH, ZERO};
+use crate::eigen::solve::{Packed, solve_with};
+use crate::operator::Csr;
+
+/// What the processor can do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// AVX-512 F, DQ and VL.
+    Avx512,
+    /// AVX2 and FMA.
+    Avx2,
+    /// Any processor.
+    Portable,
+}
+
+impl Kind {
+    /// The fastest that this processor has.
+    pub(crate) fn best() -> Kind {
+        [Kind::Avx512, Kind::Avx2].into_iter().find(|kind| kind.is_available()).unwrap_or(Kind::Portable)
+    }
+
+    /// Whether this processor has it.
+    #[cfg(target_arch = "x86_64")]
+    pub(crate) fn is_available(self) -> bool {
+        let avx2 = is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma");
+        match self {
+            Kind::Portable => true,
+            Kind::Avx2 => avx2,
+            Kind::Avx512 => {
+                avx2 && is_x86_feature_detected!("avx512f")
+                    && is_x86_feature_detected!("avx512dq")
+                    && is_x86_feature_detected!("avx512vl")
+            }
+        }
+    }
+
+    /// Whether this processor has it.
+    #[cfg(not(target_arch = "x86_64"))]
+    pub(crate) fn is_available(self) -> bool {
+        self == Kind::Portable
+    }
+}
+
+/// How a product and a sum are rounded.
+pub(crate) trait Arithmetic {
+    /// a·b + c.
+    fn fma(a: f64, b: f64, c: f64) -> f64;
+}
+
+/// Two roundings: any processor.
+pub(crate) struct Plain;
+
+/// One rounding: processors with a fused instruction.
+pub(crate) struct Fused;
+
+impl Arithmetic for Plain {
+    #[inline(always)]
+    fn fma(a: f64, b: f64, c: f64) -> f64 {
+        a * b + c
+    }
+}
+
+impl Arithmetic for Fused {
+    #[inline(always)]
+    fn fma(a: f64, b: f64, c: f64) -> f64 {
+        a.mul_add(b, c)
+    }
+}
+
+/// c += a·b for a row.
+#[inline(always)]
+pub(crate) fn add_scaled<A: Arithmetic>(c: &mut Row, a: f64, b: &Row) {
+    for k in 0..WIDTH {
+        c[k] = A::fma(a, b[k], c[k]);
+    }
+}
+
+/// Asks for a row that will be read soon. A hint: the row need not exist.
+#[inline(always)]
+pub(crate) fn prefetch(rows: &[Row], row: usize) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        // SAFETY: a prefetch neither faults nor changes what a program computes, whatever the address.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(rows.as_ptr().wrapping_add(row).cast()) };
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (rows, row);
+}
+
+/// Rows that are walked together, so that a panel of each block in use stays in the caches (8 KiB each).
+const PANEL: usize = 128;
+
+/// How far ahead of its use a block's row is asked for.
+const AHEAD: usize = 64;
+
+/// Qᵀ W_p for P blocks at once, HIGH columns of Q at once.
+#[inline(always)]
+pub(crate) fn outer<A: Arithmetic, const HIGH: usize, const P: usize>(q: &[Row], w: [&[Row]; P]) -> [Small; P] {
+    let rows = q.len();
+    let w = w.map(|w| &w[..rows]);
+    let mut out = [SMALL_ZERO; P];
+    for high in (0..WIDTH).step_by(HIGH) {
+        let mut sum = [[ZERO; HIGH]; P];
+        for i in 0..rows {
+            if high == 0 {
+                prefetch(q, i + AHEAD);
+            }
+            // A copy of each row, and vectors outermost: otherwise the compiler takes the wrong loop for the lanes.
+            for p in 0..P {
+                let w = w[p][i];
+                for a in 0..HIGH {
+                    add_scaled::<A>(&mut sum[p][a], q[i][high + a], &w);
+                }
+            }
+        }
+        for p in 0..P {
+            out[p][high..high + HIGH].copy_from_slice(&sum[p]);
+        }
+    }
+    out
+}
+
+#[inline(always)]
+fn add(sum: &mut Small, part: &Small) {
+    for a in 0..WIDTH {
+        for k in 0..WIDTH {
+            sum[a][k] += part[a][k];
+        }
+    }
+}
+
+/// out[i·blocks + k] = Q_kᵀ W_i; the first block decides how many rows there are.
+#[inline(always)]
+fn gram_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>(
+    blocks: &[&[Row]],
+    ws: &[&[Row]],
+    out: &mut [Small],
+) {
+    out.fill(SMALL_ZERO);
+    let rows = blocks.first().map_or(0, |block| block.len());
+    for first in (0..rows).step_by(PANEL) {
+        let panel = first..(first + PANEL).min(rows);
+        for (k, block) in blocks.iter().enumerate() {
+            let q = &block[panel.clone()];
+            let mut i = 0;
+            while i + P <= ws.len() {
+                let part = outer::<A, HIGH, P>(q, std::array::from_fn(|p| &ws[i + p][panel.clone()]));
+                part.iter().enumerate().for_each(|(p, part)| add(&mut out[(i + p) * blocks.len() + k], part));
+                i += P;
+            }
+            for i in i..ws.len() {
+                let [part] = outer::<A, HIGH, 1>(q, [&ws[i][panel.clone()]]);
+                add(&mut out[i * blocks.len() + k], &part);
+            }
+        }
+    }
+}
+
+/// Rows `at..at + R` of P blocks W_p (+)= Σ_k Q_k C_kp.
+#[inline(always)]
+fn tile<A: Arithmetic, const R: usize, const P: usize>(
+    blocks: &[&[Row]],
+    c: [&[Small]; P],
+    w: &mut [&mut [Row]; P],
+    at: usize,
+    add: bool,
+) {
+    let mut sum = [[ZERO; R]; P];
+    if add {
+        for p in 0..P {
+            sum[p].copy_from_slice(&w[p][at..at + R]);
+        }
+    }
+    for (k, block) in blocks.iter().enumerate() {
+        (0..R).for_each(|r| prefetch(block, at + AHEAD + r));
+        let q = &block[at..at + R];
+        for a in 0..WIDTH {
+            for r in 0..R {
+                for p in 0..P {
+                    add_scaled::<A>(&mut sum[p][r], q[r][a], &c[p][k][a]);
+                }
+            }
+        }
+    }
+    for p in 0..P {
+        w[p][at..at + R].copy_from_slice(&sum[p]);
+    }
+}
+
+/// W_i (+)= Σ_k Q_k C_ki with C_ki = c[i·blocks + k], the layout of `gram`.
+#[inline(always)]
+fn update_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>(
+    blocks: &[&[Row]],
+    c: &[Small],
+    ws: &mut [&mut [Row]],
+    add: bool,
+) {
+    let rows = blocks.first().map_or(0, |block| block.len());
+    let panel = PANEL / 2; // a multiple of R
+    for first in (0..rows).step_by(panel) {
+        let end = (first + panel).min(rows);
+        let mut c = c.chunks_exact(blocks.len());
+        let mut several = ws.chunks_exact_mut(P);
+        for ws in &mut several {
+            let c: [&[Small]; P] = std::array::from_fn(|_| c.next().unwrap_or_default());
+            let Ok(ws) = <&mut [&mut [Row]; P]>::try_from(ws) else { continue };
+            let whole = end - (end - first) % R;
+            for at in (first..whole).step_by(R) {
+                tile::<A, R, P>(blocks, c, ws, at, add);
+            }
+            for at in whole..end {
+                tile::<A, 1, P>(blocks, c, ws, at, add);
+            }
+        }
+        for (w, c) in several.into_remainder().iter_mut().zip(c) {
+            let ws = std::array::from_mut(w);
+            let whole = end - (end - first) % R;
+            for at in (first..whole).step_by(R) {
+                tile::<A, R, 1>(blocks, [c], ws, at, add);
+            }
+            for at in whole..end {
+                tile::<A, 1, 1>(blocks, [c], ws, at, add);
+            }
+        }
+    }
+}
+
+/// W += Q C, then out = Pᵀ W, or Wᵀ W if no P is given, in one pass.
+#[inline(always)]
+fn recur_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>(
+    q: &[Row],
+    c: &Small,
+    w: &mut [Row],
+    p: Option<&[Row]>,
+    out: &mut Small,
+) {
+    *out = SMALL_ZERO;
+    for first in (0..q.len()).step_by(PANEL) {
+        let panel = first..(first + PANEL).min(q.len());
+        let w = &mut w[panel.clone()];
+        update_with::<A, R, HIGH, 1>(&[&q[panel.clone()]], std::slice::from_ref(c), &mut [w], true);
+        let [part] = outer::<A, HIGH, 1>(p.map_or(&*w, |p| &p[panel]), [&*w]);
+        self::add(out, &part);
+    }
+}
+
+/// W = W C in place.
+#[inline(always)]
+fn scale_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>(c: &Small, w: &mut [Row]) {
+    let mut before = [ZERO; PANEL];
+    for w in w.chunks_mut(PANEL) {
+        let before = &mut before[..w.len()];
+        before.copy_from_slice(w);
+        update_with::<A, R, HIGH, 1>(&[before], std::slice::from_ref(c), &mut [w], false);
+    }
+}
+
+/// Y = a·A X + b·X + c·Y for a sparse symmetric A: the product itself, a residual, or a step of a Chebyshev recurrence.
+#[inline(always)]
+fn sparse_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>(
+    matrix: &Csr,
+    x: &[Row],
+    y: &mut [Row],
+    [a, b, c]: [f64; 3],
+) {
+    for (i, y) in y.iter_mut().enumerate().take(matrix.rows()) {
+        let mut sum = ZERO;
+        for (column, value) in matrix.row(i) {
+            add_scaled::<A>(&mut sum, value, &x[column]);
+        }
+        for k in 0..WIDTH {
+            y[k] = a * sum[k] + b * x[i][k] + c * y[k];
+        }
+    }
+}
+
+/// `squares[k]` = ‖A x_k − λ_k x_k‖² for the eight columns of X.
+#[inline(always)]
+fn residual_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>(
+    matrix: &Csr,
+    x: &[Row],
+    eigenvalues: &Row,
+    squares: &mut Row,
+) {
+    *squares = ZERO;
+    for (i, own) in x.iter().enumerate().take(matrix.rows()) {
+        let mut sum = ZERO;
+        for k in 0..WIDTH {
+            sum[k] = -eigenvalues[k] * own[k];
+        }
+        for (column, value) in matrix.row(i) {
+            add_scaled::<A>(&mut sum, value, &x[column]);
+        }
+        for k in 0..WIDTH {
+            squares[k] = A::fma(sum[k], sum[k], squares[k]);
+        }
+    }
+}
+
+/// Defines `fn name(kind, args)`, which calls the generic `name_with` compiled for that kind.
+macro_rules! dispatched {
+    ($($(#[$doc:meta])* $name:ident = $generic:ident($($arg:ident: $type:ty),*);)*) => {$(
+        $(#[$doc])*
+        pub(crate) fn $name(kind: Kind, $($arg: $type),*) {
+            // Tiles: AVX-512 has 32 registers of 8 numbers, AVX2 16 of 4, the portable kind is given 16 of 2.
+            #[cfg(target_arch = "x86_64")]
+            {
+                #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx2,fma")]
+                fn avx512($($arg: $type),*) {
+                    $generic::<Fused, 8, 8, 2>($($arg),*);
+                }
+                #[target_feature(enable = "avx2,fma")]
+                fn avx2($($arg: $type),*) {
+                    $generic::<Fused, 4, 4, 1>($($arg),*);
+                }
+                match kind {
+                    // SAFETY: the functions are ordinary safe code; calling them is unsafe only because they use
+                    // instructions that the line before has found on this processor.
+                    Kind::Avx512 if kind.is_available() => return unsafe { avx512($($arg),*) },
+                    // SAFETY: as above.
+                    Kind::Avx2 if kind.is_available() => return unsafe { avx2($($arg),*) },
+                    _ => {}
+                }
+            }
+            let _ = kind;
+            #[cfg(target_arch = "aarch64")]
+            $generic::<Fused, 4, 4, 1>($($arg),*);
+            #[cfg(not(target_arch = "aarch64"))]
+            $generic::<Plain, 2, 2, 1>($($arg),*);
+        }
+    )*};
+}
+
+dispatched! {
+    /// out[i·blocks + k] = Q_kᵀ W_i; the first block decides how many rows there are.
+    gram = gram_with(blocks: &[&[Row]], ws: &[&[Row]], out: &mut [Small]);
+    /// W_i (+)= Σ_k Q_k C_ki with C_ki = c[i·blocks + k], the layout of `gram`.
+    update = update_with(blocks: &[&[Row]], c: &[Small], ws: &mut [&mut [Row]], add: bool);
+    /// W += Q C, then out = Pᵀ W, or Wᵀ W if no P is given, in one pass.
+    recur = recur_with(q: &[Row], c: &Small, w: &mut [Row], p: Option<&[Row]>, out: &mut Small);
+    /// W = W C in place.
+    scale = scale_with(c: &Small, w: &mut [Row]);
+    /// Y = a·A X + b·X + c·Y for a sparse symmetric A.
+    sparse = sparse_with(matrix: &Csr, x: &[Row], y: &mut [Row], abc: [f64; 3]);
+    /// `squares[k]` = ‖A x_k − λ_k x_k‖² for the eight columns of X.
+    residual = residual_with(matrix: &Csr, x: &[Row], eigenvalues: &Row, squares: &mut Row);
+    /// X = (L D Lᵀ)⁻¹ X; `x` has one row more than the matrix.
+    solve = solve_with(factor: &Packed, x: &mut [Row]);
+}
+
+/// Qᵀ W of two blocks.
+pub(crate) fn gram_of(kind: Kind, q: &[Row], w: &[Row]) -> Small {
+    let mut out = [SMALL_ZERO];
+    gram(kind, &[q], &[w], &mut out);
+    out[0]
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+
+    pub(crate) fn block(rows: usize, seed: usize) -> Vec<Row> {
+        let value = |i: usize, k: usize| ((i * 7919 + k * 104_729 + seed * 31) % 1009) as f64 / 1009.0 - 0.5;
+        (0..rows).map(|i| std::array::from_fn(|k| value(i, k))).collect()
+    }
+
+    fn smalls(count: usize, seed: usize) -> Vec<Small> {
+        block(WIDTH * count, seed).chunks(WIDTH).map(|rows| std::array::from_fn(|a| rows[a])).collect()
+    }
+
+    /// Everything that every product computes from the same blocks.
+    fn all(kind: Kind, rows: usize) -> Vec<Row> {
+        let (q, p, w, v) = (block(rows, 1), block(rows, 2), block(rows, 3), block(rows, 5));
+        let blocks: [&[Row]; 2] = [&q, &p];
+        let mut seen = Vec::new();
+        let mut c = vec![SMALL_ZERO; 6];
+        gram(kind, &blocks, &[&w, &q, &v], &mut c);
+        let direct: f64 = p.iter().zip(&w).map(|(p, w)| p[3] * w[5]).sum();
+        assert!((c[1][3][5] - direct).abs() <= 1e-16 * rows as f64, "rounding of sums of products below ¼");
+        seen.extend(c.concat());
+        let mut ws = [w.clone(), p.clone(), v.clone()];
+        update(kind, &blocks, &smalls(6, 1), &mut ws.each_mut().map(|w| &mut w[..]), true);
+        let direct: f64 = (0..WIDTH).map(|a| q[0][a] * smalls(6, 1)[2][a][4] + p[0][a] * smalls(6, 1)[3][a][4]).sum();
+        assert!((ws[1][0][4] - p[0][4] - direct).abs() <= 1e-15);
+        seen.extend(ws.concat());
+        update(kind, &blocks, &smalls(6, 1), &mut ws.each_mut().map(|w| &mut w[..]), false);
+        seen.extend(ws.concat());
+        let (mut w, mut out) = (w, SMALL_ZERO);
+        recur(kind, &q, &smalls(1, 2)[0], &mut w, Some(&p), &mut out);
+        seen.extend(out);
+        recur(kind, &q, &smalls(1, 7)[0], &mut w, None, &mut out);
+        seen.extend(out);
+        scale(kind, &smalls(1, 3)[0], &mut w);
+        seen.extend(w);
+        seen
+    }
+
+    #[test]
+    fn every_kind_computes_the_same_but_for_rounding() {
+        for rows in [1, 7, 8, 9, 127, 128, 129, 1000] {
+            let portable = all(Kind::Portable, rows);
+            for kind in [Kind::Avx2, Kind::Avx512].into_iter().filter(|kind| kind.is_available()) {
+                let fused = all(kind, rows);
+                assert_eq!(fused, all(Kind::best(), rows), "the fused kinds add in the same order");
+                for (a, b) in portable.as_flattened().iter().zip(fused.as_flattened()) {
+                    // Sums of up to 1 000 products of numbers of about 1, rounded once or twice each.
+                    assert!((a - b).abs() <= 1e-15 * rows as f64 * (1.0 + a.abs()), "{a} is not {b}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,397 @@
+//! A Krylov space of the inverse around one shift, for the eigenpairs on both sides of it.
+//!
+//! Op = (A − σI)⁻¹ has the eigenvectors of A, with θ = 1/(λ − σ): the pairs next to the shift become the extreme ones,
+//! which a Krylov space finds first. With blocks of b = 8 columns (Grimes, Lewis and Simon 1994):
+//!
+//! W = Op Q_j − Q_{j−1} R_jᵀ − Q_j α_j,  α_j = Q_jᵀ Op Q_j,  W = Q_{j+1} R_{j+1}.
+//!
+//! A space may start with Ritz vectors X that another space, at the shift σ₁, was left with (rational Krylov, Ruhe
+//! 1994). There Op₁ X = X Θ + Q S; here, at σ₂ and with μ = 1/Θ + σ₁ − σ₂,
+//!
+//! Op₂ X = X μ⁻¹ + (Q + (σ₂ − σ₁) Op₂ Q) G,  G = S Θ⁻¹ μ⁻¹,
+//!
+//! so that after one solve, Op₂ Q = X C_x + Q C_q + Q₂ R, the projection of Op₂ on X, Q, Q₂ is known exactly and the
+//! recurrence goes on from there.
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use crate::eigen::EigenError;
+use crate::eigen::block::{Block, Row, SMALL_ZERO, Small, WIDTH, ZERO, cholesky, negative, product, transpose};
+use crate::eigen::factor::Factor;
+use crate::eigen::kernel::{self, gram_of};
+use crate::eigen::loss::{Loss, uniform};
+use crate::eigen::projected::{Projected, Ritz};
+use crate::eigen::seconds::Step;
+use crate::eigen::slice::Tools;
+
+/// The loss of orthogonality at which a basis is repaired. What is lost by then goes into the vectors' residuals.
+const LOSS_MAX: f64 = 1e-9;
+
+/// A measured loss above this says that the estimate cannot be trusted: from there on every block is orthogonalised.
+const LOSS_TRUSTED: f64 = 1e-8;
+
+/// Rows that are combined between two questions whether to stop.
+const ROWS_AT_ONCE: usize = 1 << 15;
+
+/// A Krylov space around one shift, growing by a block a step.
+pub(crate) struct Krylov<'a> {
+    tools: Tools<'a>,
+    factor: &'a Factor,
+    n: usize,
+    /// X, then Q_1 .. Q_{m+1}; n + 1 rows each, the last one scratch.
+    basis: Vec<Block>,
+    /// Columns of X.
+    kept: usize,
+    steps: usize,
+    projected: Projected,
+    /// What the first solve is to be combined with, if there is an X.
+    start: Vec<Start>,
+    /// σ₂ − σ₁.
+    moved: f64,
+    /// R of the last step.
+    coupling: Small,
+    loss: Loss,
+    every_step: bool,
+    random: ChaCha8Rng,
+    /// The largest |α| so far: an estimate of ‖Op‖ from below.
+    scale: f64,
+}
+
+/// What is known of a column of X: μ⁻¹ and its column of G.
+struct Start {
+    value: f64,
+    g: [f64; WIDTH],
+}
+
+/// What one space leaves to the next: Op X = X Θ + Q S at the shift.
+pub(crate) struct Handover {
+    x: Vec<Block>,
+    q: Block,
+    theta: Vec<f64>,
+    s: Vec<[f64; WIDTH]>,
+    shift: f64,
+}
+
+impl<'a> Krylov<'a> {
+    /// Starts from what another space left, or from eight random vectors. `careful`: orthogonalise at every step.
+    pub(crate) fn new(
+        tools: Tools<'a>,
+        factor: &'a Factor,
+        seed: u64,
+        handover: Option<Handover>,
+        careful: bool,
+    ) -> Krylov<'a> {
+        let n = tools.matrix.rows();
+        let kept = handover.as_ref().map_or(0, |handover| handover.theta.len());
+        let mut space = Krylov {
+            tools,
+            factor,
+            n,
+            basis: Vec::new(),
+            kept,
+            steps: 0,
+            projected: Projected::new(kept),
+            start: Vec::new(),
+            moved: 0.0,
+            coupling: SMALL_ZERO,
+            loss: Loss::default(),
+            every_step: careful,
+            random: ChaCha8Rng::seed_from_u64(seed),
+            scale: 0.0,
+        };
+        if let Some(Handover { x, q, theta, s, shift }) = handover {
+            space.moved = factor.shift - shift;
+            space.start = theta
+                .iter()
+                .zip(s)
+                .map(|(theta, s)| {
+                    let value = 1.0 / (1.0 / theta - space.moved);
+                    Start { value, g: s.map(|s| s / theta * value) }
+                })
+                .collect();
+            space.basis = x;
+            space.basis.push(q);
+        } else {
+            let mut start = tools.pool.take(n + 1);
+            start[..n].iter_mut().for_each(|row| *row = std::array::from_fn(|_| uniform(&mut space.random)));
+            let square = gram_of(tools.kind, &start[..n], &start[..n]);
+            space.orthonormalise(&mut start, square);
+            space.basis.push(start);
+        }
+        space.loss.repaired(kept, &mut space.random);
+        space
+    }
+
+    /// m: the dimension of the projected problem.
+    pub(crate) fn dimension(&self) -> usize {
+        if self.steps == 0 { 0 } else { self.kept + WIDTH * self.steps }
+    }
+
+    /// The space can grow by another block.
+    pub(crate) fn can_grow(&self) -> bool {
+        WIDTH * (self.basis.len() + 1) <= self.n
+    }
+
+    /// Grows the space by one block.
+    pub(crate) fn step(&mut self) {
+        let (n, kind, last) = (self.n, self.tools.kind, self.basis.len() - 1);
+        let clock = &self.tools.progress.clock;
+        let mut w = self.tools.pool.take(n + 1);
+        w.copy_from_slice(&self.basis[last]);
+        clock.time(Step::Solve, || kernel::solve(kind, &self.factor.packed, &mut w));
+        clock.time(Step::Orthogonalise, || self.recur(w));
+    }
+
+    /// Orthogonalises Op Q_j and takes it into the basis.
+    fn recur(&mut self, mut w: Block) {
+        let (n, kind, last) = (self.n, self.tools.kind, self.basis.len() - 1);
+        // X is coupled to the first two blocks. Later the three-term recurrence removes all but rounding.
+        let coupled = self.kept > 0 && self.steps < 2;
+        let mut alpha = SMALL_ZERO;
+        let mut square = SMALL_ZERO;
+        let mut along = Vec::new();
+        if coupled {
+            along = self.orthogonalise(&mut w);
+            self.orthogonalise(&mut w).iter().zip(&mut along).for_each(|(again, along)| add(along, again));
+            alpha = along[last];
+        } else {
+            if self.steps > 0 {
+                let back = negative(&transpose(&self.coupling));
+                let (before, q) = (&self.basis[last - 1][..n], &self.basis[last][..n]);
+                kernel::recur(kind, before, &back, &mut w[..n], Some(q), &mut alpha);
+            } else {
+                alpha = gram_of(kind, &self.basis[last][..n], &w[..n]);
+            }
+            kernel::recur(kind, &self.basis[last][..n], &negative(&alpha), &mut w[..n], None, &mut square);
+            if self.every_step {
+                add(&mut alpha, &self.orthogonalise(&mut w)[last]);
+            }
+        }
+        if coupled || self.every_step {
+            square = gram_of(kind, &w[..n], &w[..n]);
+        }
+        self.loss.measure(&alpha);
+        let turned = transpose(&alpha);
+        for a in 0..WIDTH {
+            for c in 0..WIDTH {
+                alpha[a][c] = 0.5 * (alpha[a][c] + turned[a][c]); // symmetric but for rounding
+                self.scale = self.scale.max(alpha[a][c].abs());
+            }
+        }
+        let r = self.orthonormalise(&mut w, square);
+        self.project(&along, &alpha, &r);
+
+        let before = std::mem::replace(&mut self.coupling, r);
+        let columns = WIDTH * self.basis.len();
+        if coupled || self.every_step {
+            self.loss.repaired(columns, &mut self.random);
+        } else if self.loss.step(&self.projected, &alpha, &before, &r, &mut self.random) > LOSS_MAX {
+            self.repair(&mut w);
+            self.loss.repaired(columns, &mut self.random);
+        }
+        self.basis.push(w);
+        self.steps += 1;
+    }
+
+    /// Notes what a step has found in the projected operator.
+    fn project(&mut self, along: &[Small], alpha: &Small, r: &Small) {
+        let at = self.kept + WIDTH * self.steps;
+        for a in 0..WIDTH {
+            for c in 0..WIDTH {
+                self.projected.set(at + a, at + c, alpha[a][c]);
+                self.projected.set(at + WIDTH + a, at + c, r[a][c]);
+            }
+        }
+        if self.steps > 0 {
+            return;
+        }
+        let c_x = |i: usize| &along[i / WIDTH][i % WIDTH];
+        let dot = |a: &[f64; WIDTH], b: &[f64; WIDTH]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        for (i, start) in self.start.iter().enumerate() {
+            for j in 0..=i {
+                let both = dot(c_x(i), &self.start[j].g) + dot(c_x(j), &start.g); // symmetric but for rounding
+                self.projected.set(i, j, 0.5 * self.moved * both + if i == j { start.value } else { 0.0 });
+            }
+            // Qᵀ Op₂ X is known twice.
+            let known = |a: usize| start.g[a] + self.moved * dot(&alpha[a], &start.g);
+            self.loss.inherit((0..WIDTH).map(|a| (known(a) - c_x(i)[a]).abs()).fold(0.0, f64::max));
+            for (a, r) in r.iter().enumerate() {
+                self.projected.set(at + a, i, c_x(i)[a]);
+                self.projected.set(at + WIDTH + a, i, self.moved * dot(r, &start.g));
+            }
+        }
+    }
+
+    /// W −= B Bᵀ W over the whole basis; returns the coefficients, a block's after another's.
+    fn orthogonalise(&self, w: &mut [Row]) -> Vec<Small> {
+        let blocks: Vec<&[Row]> = self.basis.iter().map(|block| &block[..self.n]).collect();
+        let mut c = vec![SMALL_ZERO; blocks.len()];
+        kernel::gram(self.tools.kind, &blocks, &[&w[..self.n]], &mut c);
+        let minus: Vec<Small> = c.iter().map(negative).collect();
+        kernel::update(self.tools.kind, &blocks, &minus, &mut [&mut w[..self.n]], true);
+        c
+    }
+
+    /// Makes the last block and the new one orthogonal to all before them:
+    /// both, because the recurrence goes on from both, and together, because the basis is then read once.
+    fn repair(&mut self, w: &mut [Row]) {
+        let (n, kind) = (self.n, self.tools.kind);
+        let Some((last, earlier)) = self.basis.split_last_mut() else { return };
+        let blocks: Vec<&[Row]> = earlier.iter().map(|block| &block[..n]).collect();
+        let mut c = vec![SMALL_ZERO; 2 * blocks.len()];
+        kernel::gram(kind, &blocks, &[&last[..n], &w[..n]], &mut c);
+        let measured = c.as_flattened().as_flattened().iter().fold(0.0f64, |most, c| most.max(c.abs()));
+        self.every_step |= measured > LOSS_TRUSTED;
+        let minus: Vec<Small> = c.iter().map(negative).collect();
+        kernel::update(kind, &blocks, &minus, &mut [&mut last[..n], &mut w[..n]], true);
+        let between = negative(&gram_of(kind, &last[..n], &w[..n]));
+        kernel::update(kind, &[&last[..n]], &[between], &mut [&mut w[..n]], true);
+    }
+
+    /// W = Q R with R upper triangular; W becomes Q. `square` is Wᵀ W. Cholesky of it, again while R is ill-conditioned
+    /// (the loss of orthogonality is 1e-16 times the square of its condition); columns one by one if W has lost rank.
+    fn orthonormalise(&mut self, w: &mut Block, mut square: Small) -> Small {
+        let n = self.n;
+        let mut total: Option<Small> = None;
+        for _ in 0..4 {
+            let Some((r, inverse)) = cholesky(&square) else {
+                break;
+            };
+            let (least, most) =
+                (0..WIDTH).fold((f64::INFINITY, 0.0f64), |(least, most), i| (least.min(r[i][i]), most.max(r[i][i])));
+            if most <= 1e-13 * self.scale {
+                break; // an invariant subspace: what is left of W is rounding
+            }
+            kernel::scale(self.tools.kind, &inverse, &mut w[..n]);
+            total = Some(total.map_or(r, |total| product(&r, &total)));
+            if most / least < 50.0 {
+                return total.unwrap_or(r);
+            }
+            // Scaling up by 1/R amplified what was left along the basis.
+            if most / least > 1e6 {
+                self.orthogonalise(w);
+            }
+            square = gram_of(self.tools.kind, &w[..n], &w[..n]);
+        }
+        let rounding = if total.is_none() { 1e-12 * self.scale } else { 0.0 };
+        let r = self.fill_up(w, rounding);
+        total.map_or(r, |total| product(&r, &total))
+    }
+
+    /// Gram-Schmidt column by column; a column that depends on those before it, or is no longer than `rounding`, gets a
+    /// zero row in R and is replaced by a random vector orthogonal to everything. The recurrence still holds, but its
+    /// loss can no longer be foreseen.
+    fn fill_up(&mut self, w: &mut Block, rounding: f64) -> Small {
+        self.every_step = true;
+        let w = &mut w[..self.n];
+        let mut r = SMALL_ZERO;
+        for j in 0..WIDTH {
+            let before = norm_of(w, j);
+            for _ in 0..2 {
+                for i in 0..j {
+                    let along: f64 = w.iter().map(|row| row[i] * row[j]).sum();
+                    w.iter_mut().for_each(|row| row[j] -= along * row[i]);
+                    r[i][j] += along;
+                }
+            }
+            let left = norm_of(w, j);
+            if left > 1e-10 * before && left > rounding {
+                r[j][j] = left;
+                w.iter_mut().for_each(|row| row[j] /= left);
+                continue;
+            }
+            let mut fresh = vec![ZERO; self.n];
+            fresh.iter_mut().for_each(|row| row[j] = uniform(&mut self.random));
+            for _ in 0..2 {
+                self.orthogonalise(&mut fresh);
+                for i in 0..j {
+                    let along: f64 = w.iter().zip(&fresh).map(|(w, f)| w[i] * f[j]).sum();
+                    fresh.iter_mut().zip(w.iter()).for_each(|(f, w)| f[j] -= along * w[i]);
+                }
+                let norm = norm_of(&fresh, j);
+                fresh.iter_mut().for_each(|row| row[j] /= norm);
+            }
+            w.iter_mut().zip(&fresh).for_each(|(w, f)| w[j] = f[j]);
+        }
+        r
+    }
+
+    /// Eigenpairs of the projected operator; `None` if they cannot be computed (not finite).
+    pub(crate) fn ritz(&self) -> Option<Ritz> {
+        self.tools.progress.clock.time(Step::Project, || self.projected.ritz(self.dimension()))
+    }
+
+    /// Ritz vectors of the chosen columns into blocks of eight (the last one filled up with zeros), with one step of
+    /// inverse iteration that costs no solve: x = B s + Q_{m+1} R s_last / θ is Op B s / θ, so that the residual
+    /// (A − λ) x is β (λ − σ)², free of the factor ‖A‖.
+    pub(crate) fn vectors(&self, ritz: &Ritz, chosen: &[usize], into: &mut [&mut [Row]]) -> Result<(), EigenError> {
+        self.combine(ritz, chosen, true, into)
+    }
+
+    fn combine(
+        &self,
+        ritz: &Ritz,
+        chosen: &[usize],
+        inverse_step: bool,
+        into: &mut [&mut [Row]],
+    ) -> Result<(), EigenError> {
+        let m = self.dimension();
+        let used = m / WIDTH + usize::from(inverse_step);
+        let mut c = vec![SMALL_ZERO; used * into.len()];
+        for (place, &column) in chosen.iter().enumerate() {
+            let (c, to) = (&mut c[place / WIDTH * used..][..used], place % WIDTH);
+            for from in 0..m {
+                c[from / WIDTH][from % WIDTH][to] = ritz.vectors[(from, column)];
+            }
+            if inverse_step {
+                for (a, x) in ritz.couplings[column].iter().enumerate() {
+                    c[used - 1][a][to] = x / ritz.values[column];
+                }
+            }
+        }
+        self.tools.progress.clock.time(Step::Vectors, || {
+            for first in (0..self.n).step_by(ROWS_AT_ONCE) {
+                self.tools.progress.go_on()?;
+                let rows = first..(first + ROWS_AT_ONCE).min(self.n);
+                let blocks: Vec<&[Row]> = self.basis[..used].iter().map(|block| &block[rows.clone()]).collect();
+                let mut into: Vec<&mut [Row]> = into.iter_mut().map(|block| &mut block[rows.clone()]).collect();
+                kernel::update(self.tools.kind, &blocks, &c, &mut into, false);
+            }
+            Ok(())
+        })
+    }
+
+    /// Ends the space and leaves the chosen Ritz vectors, a multiple of eight, to the next one.
+    pub(crate) fn hand_over(mut self, ritz: &Ritz, chosen: &[usize]) -> Result<Handover, EigenError> {
+        let mut x: Vec<Block> = chosen.chunks(WIDTH).map(|_| self.tools.pool.take(self.n + 1)).collect();
+        let mut into: Vec<&mut [Row]> = x.iter_mut().map(|x| &mut x[..self.n]).collect();
+        self.combine(ritz, chosen, false, &mut into)?;
+        let q = self.basis.pop().unwrap_or_else(|| unreachable!("a basis has a block"));
+        Ok(Handover {
+            x,
+            q,
+            theta: chosen.iter().map(|&k| ritz.values[k]).collect(),
+            s: chosen.iter().map(|&k| ritz.couplings[k]).collect(),
+            shift: self.factor.shift,
+        })
+    }
+}
+
+impl Drop for Krylov<'_> {
+    fn drop(&mut self) {
+        self.tools.pool.give(self.basis.drain(..));
+    }
+}
+
+fn add(sum: &mut Small, part: &Small) {
+    for a in 0..WIDTH {
+        for c in 0..WIDTH {
+            sum[a][c] += part[a][c];
+        }
+    }
+}
+
+fn norm_of(block: &[Row], column: usize) -> f64 {
+    block.iter().map(|row| row[column] * row[column]).sum::<f64>().sqrt()
+}

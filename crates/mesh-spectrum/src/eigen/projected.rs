@@ -1,0 +1,76 @@
+//! The operator projected on a Krylov space: a symmetric matrix, block tridiagonal but for the vectors that the space
+//! starts with, and its eigenpairs.
+
+use std::ops::Range;
+
+use faer::{Mat, Side};
+
+use crate::eigen::block::WIDTH;
+
+/// H, growing by a block at a time.
+#[derive(Debug, Default)]
+pub(crate) struct Projected {
+    /// Columns kept from another space, which couple to each other and to the two blocks after them.
+    kept: usize,
+    rows: Vec<Vec<f64>>,
+}
+
+/// Eigenpairs of H.
+pub(crate) struct Ritz {
+    /// θ.
+    pub(crate) values: Vec<f64>,
+    /// What couples each vector to the block that is not yet in H: the residual is its norm.
+    pub(crate) couplings: Vec<[f64; WIDTH]>,
+    pub(crate) vectors: Mat<f64>,
+}
+
+impl Projected {
+    pub(crate) fn new(kept: usize) -> Projected {
+        Projected { kept, rows: Vec::new() }
+    }
+
+    /// Sets an entry and its mirror image.
+    pub(crate) fn set(&mut self, i: usize, j: usize, value: f64) {
+        let size = i.max(j) + 1;
+        if self.rows.len() < size {
+            let size = size.next_multiple_of(WIDTH);
+            self.rows.iter_mut().for_each(|row| row.resize(size, 0.0));
+            self.rows.resize(size, vec![0.0; size]);
+        }
+        self.rows[i][j] = value;
+        self.rows[j][i] = value;
+    }
+
+    /// One row, as long as the matrix is by now.
+    pub(crate) fn row(&self, k: usize) -> &[f64] {
+        &self.rows[k]
+    }
+
+    /// The columns in which row k can have entries.
+    pub(crate) fn coupled_to(&self, k: usize) -> Range<usize> {
+        let all_kept = self.kept + 2 * WIDTH;
+        let block = k - k % WIDTH;
+        let start = if k < all_kept && self.kept > 0 { 0 } else { block.saturating_sub(WIDTH) };
+        start..self.rows.len().min(if k < self.kept { all_kept } else { block + 2 * WIDTH })
+    }
+
+    /// Eigenpairs of the leading m × m part, the next eight rows being what it is coupled to; `None` if they cannot be
+    /// computed (not finite).
+    pub(crate) fn ritz(&self, m: usize) -> Option<Ritz> {
+        let h = Mat::from_fn(m, m, |i, j| self.rows[i][j]);
+        let pairs = h.self_adjoint_eigen(Side::Lower).ok()?;
+        let values: Vec<f64> = pairs.S().column_vector().iter().copied().collect();
+        let vectors = pairs.U().to_owned();
+        let first = self.coupled_to(m).start;
+        let coupling = |k: usize, a: usize| (first..m).map(|i| self.rows[m + a][i] * vectors[(i, k)]).sum();
+        let couplings = (0..m).map(|k| std::array::from_fn(|a| coupling(k, a))).collect();
+        values.iter().all(|value| value.is_finite()).then_some(Ritz { values, couplings, vectors })
+    }
+}
+
+impl Ritz {
+    /// ‖Op x − θ x‖.
+    pub(crate) fn residual(&self, k: usize) -> f64 {
+        self.couplings[k].iter().map(|x| x * x).sum::<f64>().sqrt()
+    }
+}
