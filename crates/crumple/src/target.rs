@@ -10,7 +10,7 @@ use crate::field::Field;
 use crate::project::{ProjectedState, project};
 use crate::rotation;
 use crate::run::Run;
-use crate::study::{Function, Loaded, Need, Rows, Study, triples};
+use crate::study::{Coefficients, Function, Loaded, Need, Rows, Study, triples};
 use crate::vector::{Vector, subtract};
 
 /// A run and a state as they were written.
@@ -78,26 +78,28 @@ impl Target {
         caveats
     }
 
-    /// Stored coefficients as a comparison needs them.
+    /// What a comparison needs of it: one row, as if it stood in a study.
     ///
     /// # Errors
     /// [`Error::UnknownField`] if the study does not keep the function.
-    pub fn on(&self, need: &Need) -> Result<Vec<f32>, Error> {
-        let all = self.values(need.function)?;
-        let components = need.function.components();
-        Ok(match &need.eigenvectors {
-            None => all,
-            Some(j) => j.iter().flat_map(|&j| all[components * (j - 1)..components * j].to_vec()).collect(),
+    pub fn on(&self, need: &Need) -> Result<Coefficients, Error> {
+        let (function, all) = (need.function, self.values(need.function)?);
+        let components = function.components();
+        let eigenvectors = need.eigenvectors.clone().unwrap_or_else(|| (1..=all.len() / components).collect());
+        let rms = match function {
+            Function::Displacement => vec![self.rms],
+            Function::Rotation => vec![self.turn],
+            Function::Field(_) => Vec::new(),
+        };
+        Ok(Coefficients {
+            function,
+            runs: vec![self.run.clone()],
+            states: vec![self.state as u32],
+            times: vec![self.time],
+            rms,
+            values: eigenvectors.iter().flat_map(|j| &all[components * (j - 1)..components * j]).copied().collect(),
+            eigenvectors,
         })
-    }
-
-    /// Root mean square of a function over the surface; 0 for fields.
-    pub fn rms(&self, function: Function) -> f64 {
-        match function {
-            Function::Displacement => self.rms,
-            Function::Rotation => self.turn,
-            Function::Field(_) => 0.0,
-        }
     }
 
     /// All K coefficients of a function, K × components.

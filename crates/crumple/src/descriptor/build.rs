@@ -10,10 +10,9 @@ use crate::modes;
 use crate::reconstruct::{Errors, displaced, errors, field_errors, reconstruct};
 use crate::rivals::Pca;
 use crate::rotation::{RotationSpectrum, Ruler};
-use crate::select::Kind;
-use crate::select::Select;
+use crate::select::{Kind, Select};
 use crate::study::{Coefficients, Function, Loaded, Rows};
-use crate::target::{Named, Target};
+use crate::target::{Named, Target, on_surface};
 use crate::vector::{Vector, square};
 
 /// A descriptor with the shapes that show it.
@@ -206,7 +205,7 @@ fn looked_at(basis: &Basis, function: Function, select: Select, coefficients: &[
     }
 }
 
-/// Chooses J for a function. `original` is asked only by `error:`; without it that rule is refused.
+/// Chooses J for a function. `original`: the function on the mesh, where it has been read; only `error:` asks for it.
 fn select(
     loaded: &Loaded,
     subject: &Subject,
@@ -214,19 +213,17 @@ fn select(
     options: &DescribeOptions,
     original: Option<&[Vector]>,
 ) -> Result<Selected, Error> {
-    let of = |coefficients: &[Vector], original: Option<&[Vector]>| {
-        choose(loaded, function, options, coefficients, || match original {
+    let selection = match subject.share() {
+        None => choose(loaded, function, options, &subject.coefficients(function)?, || match original {
             Some(original) => Ok(original.to_vec()),
             None => subject.original(loaded, function),
-        })
-    };
-    let selection = match subject.share() {
-        None => of(&subject.coefficients(function)?, original)?,
+        })?,
         Some(share) => {
             let mut passed = vec![0_usize; loaded.basis.eigenpairs()];
             let mut threshold = 0.0;
-            for (_, member) in &subject.members {
-                let found = of(&triples_of(member, function)?, None)?;
+            for (named, member) in &subject.members {
+                let own = || on_surface(loaded, named, member, function);
+                let found = choose(loaded, function, options, &triples_of(member, function)?, own)?;
                 found.eigenvectors.iter().for_each(|j| passed[j - 1] += 1);
                 threshold += found.threshold / subject.members.len() as f64;
             }
@@ -289,16 +286,10 @@ struct Shown {
 }
 
 fn draw(loaded: &Loaded, subject: &Subject, mut selected: Selected, original: Vec<Vector>) -> Result<Shown, Error> {
-    let (reference, basis) = (&loaded.reference, &loaded.basis);
+    let basis = &loaded.basis;
     let function = selected.function();
     let coefficients = subject.coefficients(function)?;
-    let rebuilt = |eigenvectors: &[usize]| match function {
-        Function::Displacement => reconstruct(reference, basis, selected.select, eigenvectors, &coefficients),
-        Function::Rotation | Function::Field(_) => {
-            let kept: Vec<Vector> = eigenvectors.iter().map(|&j| coefficients[j - 1]).collect();
-            synthesize(basis, eigenvectors, &kept)
-        }
-    };
+    let rebuilt = |eigenvectors: &[usize]| rebuilt(loaded, function, selected.select, eigenvectors, &coefficients);
     let errors_of = |found: &[Vector]| errors_of(loaded, function, &original, found);
     let first: Vec<usize> = (1..=basis.eigenpairs()).collect();
     let m = selected.eigenvectors.len();
@@ -313,6 +304,24 @@ fn draw(loaded: &Loaded, subject: &Subject, mut selected: Selected, original: Ve
     selected.errors = Some(found);
     selected.rivals = rivals;
     Ok(Shown { selected, values, original, reconstruction, first_m, first_k })
+}
+
+/// A function on the mesh from some of its coefficients, K × 3: the shape, or the field.
+fn rebuilt(
+    loaded: &Loaded,
+    function: Function,
+    select: Select,
+    eigenvectors: &[usize],
+    coefficients: &[Vector],
+) -> Vec<Vector> {
+    let (reference, basis) = (&loaded.reference, &loaded.basis);
+    match function {
+        Function::Displacement => reconstruct(reference, basis, select, eigenvectors, coefficients),
+        Function::Rotation | Function::Field(_) => {
+            let kept: Vec<Vector> = eigenvectors.iter().map(|&j| coefficients[j - 1]).collect();
+            synthesize(basis, eigenvectors, &kept)
+        }
+    }
 }
 
 fn errors_of(loaded: &Loaded, function: Function, original: &[Vector], found: &[Vector]) -> Errors {
@@ -334,17 +343,13 @@ pub(crate) fn choose(
     coefficients: &[Vector],
     original: impl FnOnce() -> Result<Vec<Vector>, Error>,
 ) -> Result<Selection, Error> {
-    let (reference, basis) = (&loaded.reference, &loaded.basis);
+    let basis = &loaded.basis;
     let &DescribeOptions { select, threshold, signed, .. } = options;
     let values = looked_at(basis, function, select, coefficients);
     let is_shape = function == Function::Displacement;
     let beyond = if let Threshold::Error(_) = threshold {
         let all: Vec<usize> = (1..=basis.eigenpairs()).collect();
-        let rebuilt = match is_shape {
-            true => reconstruct(reference, basis, select, &all, coefficients),
-            false => synthesize(basis, &all, coefficients),
-        };
-        errors_of(loaded, function, &original()?, &rebuilt).rms
+        errors_of(loaded, function, &original()?, &rebuilt(loaded, function, select, &all, coefficients)).rms
     } else {
         0.0
     };
