@@ -31,6 +31,11 @@ impl Output {
             let _ = writeln!(std::io::stderr(), "note: {text}");
         }
     }
+
+    /// What was noticed about a run, a line each.
+    pub(crate) fn notes_on(&self, run: &str, warnings: &[String]) {
+        warnings.iter().for_each(|warning| self.note(&format!("{run}: {warning}")));
+    }
 }
 
 /// A line under the header and one at the end: a table that can be pasted into a mail.

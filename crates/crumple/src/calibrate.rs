@@ -7,11 +7,11 @@
 
 use crate::Error;
 use crate::descriptor::{Calibration, Descriptor};
-use crate::features::Features;
+use crate::features::{Features, Samples};
 use crate::similarity::{Comparer, Metric, SimilarityOptions};
 use crate::study::{Loaded, Rows};
 use crate::target::Target;
-use crate::vector::unit;
+use crate::vector::{product, unit};
 
 /// The largest number of folds.
 const FOLDS: usize = 10;
@@ -76,7 +76,7 @@ pub fn calibrate(
         folds,
         false_pass: passed as f64 / no.len() as f64,
         false_fail: failed as f64 / yes.len() as f64,
-        known: known(comparer.features(), loaded)?,
+        known: Known::new(comparer.features(), &samples).limit(),
     })
 }
 
@@ -99,35 +99,48 @@ fn separate(yes: &[f64], no: &[f64]) -> f64 {
     threshold
 }
 
-/// The similarity to the nearest neighbour that nearly all runs of the study reach.
-fn known(features: &Features, loaded: &Loaded) -> Result<f64, Error> {
-    let mut nearest: Vec<f64> = {
-        let all = all_units(features, loaded)?;
-        (0..all.len()).map(|run| nearest_similarity(&all[run].1, &all, &all[run].0)).collect()
-    };
-    nearest.sort_by(f64::total_cmp);
-    Ok(nearest[(UNKNOWN_SHARE * nearest.len() as f64).floor() as usize])
+/// The last states of a study's runs, by what a descriptor compares: they tell whether a state is like anything known.
+#[derive(Debug, Clone)]
+pub struct Known {
+    features: Features,
+    /// Run id and numbers of length 1.
+    runs: Vec<(String, Vec<f64>)>,
 }
 
-/// How like the most like run of the study a state is, −1 to 1, by what a calibrated descriptor compares.
-///
-/// # Errors
-/// [`Error::UnknownField`], reading errors.
-pub fn nearest_known(loaded: &Loaded, comparer: &Comparer, target: &Target) -> Result<f64, Error> {
-    let all = all_units(comparer.features(), loaded)?;
-    let numbers = unit(comparer.numbers(target)?);
-    Ok(nearest_similarity(&numbers, &all, &target.run))
-}
+impl Known {
+    /// Reads them once for any number of questions.
+    ///
+    /// # Errors
+    /// Reading errors.
+    pub fn of(loaded: &Loaded, comparer: &Comparer) -> Result<Self, Error> {
+        let features = comparer.features();
+        Ok(Self::new(features, &features.read(&loaded.study, Rows::Last)?))
+    }
 
-fn all_units(features: &Features, loaded: &Loaded) -> Result<Vec<(String, Vec<f64>)>, Error> {
-    let samples = features.read(&loaded.study, Rows::Last)?;
-    let numbers = |row: usize| (samples.run(row).to_owned(), unit(features.vector(&samples.stored(row))));
-    Ok((0..samples.rows()).map(numbers).collect())
-}
+    fn new(features: &Features, samples: &Samples) -> Self {
+        Self { features: features.clone(), runs: features.directions(samples) }
+    }
 
-fn nearest_similarity(numbers: &[f64], all: &[(String, Vec<f64>)], without: &str) -> f64 {
-    let others = all.iter().filter(|(run, _)| run != without);
-    others.map(|(_, other)| numbers.iter().zip(other).map(|(a, b)| a * b).sum()).fold(-1.0, f64::max)
+    /// How like the most like run a state is, −1 to 1; its own run does not count.
+    ///
+    /// # Errors
+    /// [`Error::UnknownField`] if it lacks what is compared.
+    pub fn nearest(&self, target: &Target) -> Result<f64, Error> {
+        let numbers = unit(self.features.vector(&self.features.sample(target)?.stored(0)));
+        Ok(self.nearest_to(&numbers, &target.run))
+    }
+
+    /// The similarity to the nearest neighbour that nearly all of them reach.
+    fn limit(&self) -> f64 {
+        let mut nearest: Vec<f64> = self.runs.iter().map(|(run, numbers)| self.nearest_to(numbers, run)).collect();
+        nearest.sort_by(f64::total_cmp);
+        nearest[(UNKNOWN_SHARE * nearest.len() as f64).floor() as usize]
+    }
+
+    fn nearest_to(&self, numbers: &[f64], without: &str) -> f64 {
+        let others = self.runs.iter().filter(|(run, _)| run != without);
+        others.map(|(_, other)| product(numbers, other)).fold(-1.0, f64::max)
+    }
 }
 
 #[cfg(test)]

@@ -11,9 +11,9 @@ use crate::Error;
 use crate::features::Features;
 use crate::modes::Modes;
 use crate::select::Kind;
-use crate::study::{Loaded, Rows, Stored};
+use crate::study::{Loaded, Rows};
 use crate::target::Target;
-use crate::vector::unit;
+use crate::vector::{product, unit};
 
 /// Members of a mode that a run is compared with: the nearest ones.
 pub const NEIGHBOURS: usize = 5;
@@ -74,8 +74,7 @@ impl Classifier {
             Kind::Paper => Features::displacement(&loaded.basis),
         };
         let samples = features.read(&loaded.study, Rows::Last)?;
-        let numbers = |row: usize| (samples.run(row).to_owned(), unit(features.vector(&samples.stored(row))));
-        let all: Vec<(String, Vec<f64>)> = (0..samples.rows()).into_par_iter().map(numbers).collect();
+        let all = features.directions(&samples);
         let of_mode = |members: &[String]| -> Vec<(String, Vec<f64>)> {
             all.iter().filter(|(run, _)| members.binary_search(run).is_ok()).cloned().collect()
         };
@@ -133,7 +132,7 @@ impl Classifier {
     /// Mean similarity to the nearest members of a mode, without the run named; −∞ where nothing is left.
     fn score(&self, mode: usize, numbers: &[f64], without: Option<&str>) -> f64 {
         let others = self.members[mode].iter().filter(|(run, _)| without != Some(run.as_str()));
-        let mut near: Vec<f64> = others.map(|(_, other)| dot(numbers, other)).collect();
+        let mut near: Vec<f64> = others.map(|(_, other)| product(numbers, other)).collect();
         near.sort_by(|a, b| b.total_cmp(a));
         near.truncate(NEIGHBOURS);
         if near.is_empty() { f64::NEG_INFINITY } else { near.iter().sum::<f64>() / near.len() as f64 }
@@ -144,11 +143,7 @@ impl Classifier {
     /// # Errors
     /// [`Error::UnknownField`].
     pub fn classify(&self, target: &Target) -> Result<Verdict, Error> {
-        let needs = self.features.needs();
-        let values: Vec<Vec<f32>> = needs.iter().map(|need| target.on(need)).collect::<Result<_, _>>()?;
-        let stored: Vec<Stored<'_>> =
-            needs.iter().zip(&values).map(|(need, values)| Stored { values, rms: target.rms(need.function) }).collect();
-        let numbers = unit(self.features.vector(&stored));
+        let numbers = unit(self.features.vector(&self.features.sample(target)?.stored(0)));
         let without = Some(target.run.as_str());
         let mut order: Vec<(usize, f64)> =
             (0..self.names.len()).map(|mode| (mode, self.score(mode, &numbers, without))).collect();
@@ -159,7 +154,7 @@ impl Classifier {
         };
         let others = self.members.iter().flatten().filter(|(run, _)| without != Some(run.as_str()));
         let like = others
-            .map(|(run, other)| (run.clone(), dot(&numbers, other)))
+            .map(|(run, other)| (run.clone(), product(&numbers, other)))
             .max_by(|a, b| a.1.total_cmp(&b.1).then_with(|| b.0.cmp(&a.0)));
         let accepted = self.accepted[nearest];
         Ok(Verdict {
@@ -172,8 +167,4 @@ impl Classifier {
             like: like.unwrap_or_default(),
         })
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

@@ -95,15 +95,17 @@ pub fn compare(loaded: &Loaded, labels: Option<&Table>, threshold: Threshold) ->
             vec!["without labels there is nothing to judge a ranking by: precision is left out".to_owned()],
         ),
     };
-    let arena = |select| Arena::new(loaded, rows, &judge, select, threshold);
+    let fixed = Fixed::of(loaded, rows)?;
+    let arena = |select| Arena::new(loaded, rows, &judge, &fixed, select, threshold);
     let arenas = [(Select::Coordinates, arena(Select::Coordinates)?), (Select::Difference, arena(Select::Difference)?)];
     let (mut result, mut rotation) = (Vec::new(), Vec::new());
     for query in &judge.queries {
         for (select, arena) in &arenas {
             result.extend(judge_query(loaded, arena, query, *select, threshold)?);
         }
-        let turned = &arenas[0].1;
-        rotation.push(turned.row(query, Method::Rotation, ROTATION.0, ROTATION.1, turned.spectra[0].len(), None));
+        // In either arena: the choice of coefficients does not matter to it.
+        let size = fixed.spectra[0].len();
+        rotation.push(arenas[0].1.row(query, Method::Rotation, ROTATION.0, ROTATION.1, size, None));
     }
     let modes = if labels.is_some() { agreements(loaded, rows, &judge)? } else { Vec::new() };
     Ok(Comparison { rows: result, rotation, modes, notes })
@@ -189,18 +191,35 @@ enum Method {
 /// Function and name of the rotation spectrum's rows.
 const ROTATION: (&str, &str) = ("rotation", "rotation spectrum");
 
-/// All runs under one choice of coefficients, ready to be ranked by any method with any run as the query.
-struct Arena<'a> {
-    rows: &'a Coefficients,
-    judge: &'a Judge,
-    /// α or δ of each run, K × 3.
-    values: Vec<Vec<[f64; 3]>>,
-    /// Eigenvectors of each run's own descriptor.
-    chosen: Vec<Vec<usize>>,
+/// What of the runs is the same under either choice of coefficients.
+struct Fixed {
     /// Scores of each run on all principal components.
     scores: Vec<Vec<f64>>,
     /// Rotation spectrum of each run.
     spectra: Vec<Vec<f64>>,
+}
+
+impl Fixed {
+    fn of(loaded: &Loaded, rows: &Coefficients) -> Result<Self, Error> {
+        let pca = Pca::of(rows, rows.rows());
+        let features = Features::rotation(&loaded.basis);
+        let turned = features.read(&loaded.study, Rows::Last)?;
+        Ok(Self {
+            scores: (0..rows.rows()).into_par_iter().map(|row| pca.scores(rows.triples(row).as_flattened())).collect(),
+            spectra: (0..rows.rows()).map(|row| features.vector(&turned.stored(row))).collect(),
+        })
+    }
+}
+
+/// All runs under one choice of coefficients, ready to be ranked by any method with any run as the query.
+struct Arena<'a> {
+    rows: &'a Coefficients,
+    judge: &'a Judge,
+    fixed: &'a Fixed,
+    /// α or δ of each run, K × 3.
+    values: Vec<Vec<[f64; 3]>>,
+    /// Eigenvectors of each run's own descriptor.
+    chosen: Vec<Vec<usize>>,
 }
 
 impl<'a> Arena<'a> {
@@ -208,10 +227,10 @@ impl<'a> Arena<'a> {
         loaded: &Loaded,
         rows: &'a Coefficients,
         judge: &'a Judge,
+        fixed: &'a Fixed,
         select: Select,
         threshold: Threshold,
     ) -> Result<Self, Error> {
-        let pca = Pca::of(rows, rows.rows());
         let delta = |row: usize| rows.triples(row);
         let options = DescribeOptions { select, threshold, ..Default::default() };
         let chosen = |row: usize| {
@@ -219,16 +238,13 @@ impl<'a> Arena<'a> {
             let original = || target::shape(loaded, &named, &target::resolve(loaded, &named)?);
             Ok(choose(loaded, Function::Displacement, &options, &delta(row), original)?.eigenvectors)
         };
-        let features = Features::rotation(&loaded.basis);
-        let turned = features.read(&loaded.study, Rows::Last)?;
         let all = 0..rows.rows();
         Ok(Self {
             rows,
             judge,
+            fixed,
             values: all.clone().map(|row| select.values(&loaded.basis, &delta(row))).collect(),
-            chosen: all.clone().into_par_iter().map(chosen).collect::<Result<_, Error>>()?,
-            scores: all.clone().into_par_iter().map(|row| pca.scores(delta(row).as_flattened())).collect(),
-            spectra: all.map(|row| features.vector(&turned.stored(row))).collect(),
+            chosen: all.into_par_iter().map(chosen).collect::<Result<_, Error>>()?,
         })
     }
 
@@ -239,8 +255,8 @@ impl<'a> Arena<'a> {
             Method::Descriptor => chosen.iter().flat_map(|&j| values[j - 1]).collect(),
             Method::FirstM => values[..chosen.len()].as_flattened().to_vec(),
             Method::FirstK => values.as_flattened().to_vec(),
-            Method::Rotation => self.spectra[row].clone(),
-            Method::Components => self.scores[row].iter().copied().take(chosen.len()).collect(),
+            Method::Rotation => self.fixed.spectra[row].clone(),
+            Method::Components => self.fixed.scores[row].iter().copied().take(chosen.len()).collect(),
         }
     }
 
@@ -350,7 +366,8 @@ fn agreements(loaded: &Loaded, rows: &Coefficients, judge: &Judge) -> Result<Vec
             if asked < 2 || asked > rows.rows() || count.is_some() && !method.takes_count() {
                 continue;
             }
-            let found = modes::modes(&loaded.study, &ModesOptions { count, method, by, ..Default::default() }, &())?;
+            let options = ModesOptions { count, method, by, ..Default::default() };
+            let found = modes::groups(&loaded.study, &loaded.basis, &options, &())?;
             // Runs that HDBSCAN leaves out agree with nothing and are counted apart.
             let mode_of = |run: &str| {
                 found

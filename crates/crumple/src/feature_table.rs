@@ -10,10 +10,10 @@ use crate::Error;
 use crate::descriptor::Descriptor;
 use crate::error::io;
 use crate::export::write_csv;
-use crate::features::Features;
+use crate::features::{Features, Samples};
 use crate::select::Kind;
 use crate::similarity::{Comparer, Score, SimilarityOptions};
-use crate::study::{Column, Loaded, Rows, Stored, add_inputs, store, write_columns};
+use crate::study::{Column, Loaded, Rows, add_inputs, store, write_columns};
 use crate::target::Target;
 
 /// Rows of numbers.
@@ -83,11 +83,7 @@ impl<'a> FeatureMaker<'a> {
         if samples.rows() == 0 {
             return Err(Error::TooFewRuns { what: "a table of features", needed: 1, have: 0 });
         }
-        let row = |row: usize| {
-            let (run, state) = (samples.run(row).to_owned(), samples.state(row) as usize);
-            self.row(run, state, samples.time(row), &samples.stored(row))
-        };
-        Ok(self.table((0..samples.rows()).map(row).collect()))
+        Ok(self.table(&samples))
     }
 
     /// One row for a state that was named or projected.
@@ -95,19 +91,21 @@ impl<'a> FeatureMaker<'a> {
     /// # Errors
     /// [`Error::UnknownField`] if it lacks what is compared.
     pub fn target(&self, target: &Target) -> Result<FeatureTable, Error> {
-        let needs = self.features.needs();
-        let values: Vec<Vec<f32>> = needs.iter().map(|need| target.on(need)).collect::<Result<_, _>>()?;
-        let stored: Vec<Stored<'_>> =
-            needs.iter().zip(&values).map(|(need, values)| Stored { values, rms: target.rms(need.function) }).collect();
-        Ok(self.table(vec![self.row(target.run.clone(), target.state, target.time, &stored)]))
+        Ok(self.table(&self.features.sample(target)?))
     }
 
-    fn row(&self, run: String, state: usize, time: f64, stored: &[Stored<'_>]) -> FeatureRow {
-        let score = self.comparer.as_ref().map(|comparer| comparer.score(stored));
-        FeatureRow { run, state, time, score, numbers: self.features.vector(stored) }
-    }
-
-    fn table(&self, rows: Vec<FeatureRow>) -> FeatureTable {
+    fn table(&self, samples: &Samples) -> FeatureTable {
+        let row = |row: usize| {
+            let stored = samples.stored(row);
+            FeatureRow {
+                run: samples.run(row).to_owned(),
+                state: samples.state(row) as usize,
+                time: samples.time(row),
+                score: self.comparer.as_ref().map(|comparer| comparer.score(&stored)),
+                numbers: self.features.vector(&stored),
+            }
+        };
+        let rows: Vec<FeatureRow> = (0..samples.rows()).map(row).collect();
         let manifest = self.loaded.study.manifest();
         let inputs = |row: &FeatureRow| {
             let record = manifest.runs.get(&row.run);

@@ -5,12 +5,16 @@
 //! whole ([`crate::rotation::Ruler`]). Search, verify, classify, monitor and the optimiser's number compare these
 //! numbers and nothing else.
 
+use rayon::prelude::*;
+
 use crate::Error;
 use crate::basis::Basis;
 use crate::descriptor::{Descriptor, Selected};
 use crate::rotation::{OCTAVES, Ruler};
 use crate::select::{Kind, Select};
 use crate::study::{Coefficients, Function, Need, Rows, Stored, Study, column_name, triples};
+use crate::target::Target;
+use crate::vector::unit;
 
 /// From coefficients to the numbers that are compared.
 #[derive(Debug, Clone)]
@@ -93,6 +97,20 @@ impl Features {
     pub fn read(&self, study: &Study, rows: Rows<'_>) -> Result<Samples, Error> {
         let read = |need: &Need| study.coefficients_of(need.function, need.eigenvectors.as_deref(), rows);
         Ok(Samples { blocks: self.needs.iter().map(read).collect::<Result<_, _>>()? })
+    }
+
+    /// What is needed of a state that was named or projected: one row.
+    ///
+    /// # Errors
+    /// [`Error::UnknownField`] if it lacks what is compared.
+    pub fn sample(&self, target: &Target) -> Result<Samples, Error> {
+        Ok(Samples { blocks: self.needs.iter().map(|need| target.on(need)).collect::<Result<_, _>>()? })
+    }
+
+    /// Every row as a direction: its run, and the numbers that are compared, of length 1.
+    pub(crate) fn directions(&self, samples: &Samples) -> Vec<(String, Vec<f64>)> {
+        let direction = |row: usize| (samples.run(row).to_owned(), unit(self.vector(&samples.stored(row))));
+        (0..samples.rows()).into_par_iter().map(direction).collect()
     }
 
     /// The numbers that are compared. `stored`: one entry for each need.

@@ -4,7 +4,6 @@
 //! α = α⁰ + δ. Beside the coefficients: how much of the displacement they catch, how much of it is a rigid motion,
 //! and how far the surface is from isometric.
 
-use faer::Mat;
 use mesh_spectrum::Watch;
 
 use std::sync::{Arc, Mutex, PoisonError};
@@ -181,17 +180,19 @@ impl<'a> Projector<'a> {
         let batch = (BATCH_BYTES / (24 * functions * self.basis.vertices())).clamp(1, 64);
         let mut hash = blake3::Hasher::new();
         let mut spent = Spent::default();
-        let mut states = Vec::with_capacity(run.times().len());
+        let (mut states, mut last_shape) = (Vec::with_capacity(run.times().len()), Vec::new());
         for first in (0..run.times().len()).step_by(batch) {
             if watch.stopped() {
                 return Err(Error::Stopped);
             }
             let last = (first + batch).min(run.times().len());
-            states.extend(self.batch(run, &placement, first..last, &mut hash, &mut spent)?);
+            let (found, shape) = self.batch(run, &placement, first..last, &mut hash, &mut spent)?;
+            states.extend(found);
+            last_shape = shape;
         }
         if let Some(last) = states.last() {
             warnings.extend(last.measures.warnings());
-            warnings.extend(self.surface_warnings(run, &placement, states.len() - 1, &last.measures)?);
+            warnings.extend(self.surface_warnings(run, &placement, states.len() - 1, &last_shape, &last.measures)?);
         }
         Ok(Projected {
             run: run.id().to_owned(),
@@ -208,10 +209,10 @@ impl<'a> Projector<'a> {
         run: &Run,
         placement: &Placement,
         state: usize,
+        shape: &[Vector],
         measures: &Measures,
     ) -> Result<Vec<String>, Error> {
         let mut warnings = Vec::new();
-        let shape = self.reference.shape(run, placement, state)?;
         let deleted = run.deleted_shells(state)?.map_or(0, |deleted| {
             let mut shells = placement.shell_of_triangle.clone();
             shells.dedup();
@@ -220,7 +221,7 @@ impl<'a> Projector<'a> {
         if deleted > 0 {
             warnings.push(format!("{deleted} shells of the surface are deleted in the last state; they count by where their nodes are, which may fly apart"));
         }
-        let health = self.rest.health(&shape);
+        let health = self.rest.health(shape);
         if health.without_area > 0 {
             warnings.push(format!(
                 "{} faces have lost their area in the last state; they have no rotation and are left out of it",
@@ -245,12 +246,12 @@ impl<'a> Projector<'a> {
     /// As [`Projector::project`].
     pub fn state(&self, run: &Run, state: usize) -> Result<ProjectedState, Error> {
         let placement = self.place(run)?;
-        let found =
-            self.batch(run, &placement, state..state + 1, &mut blake3::Hasher::new(), &mut Spent::default())?.pop();
-        found.ok_or_else(|| Error::Internal("a batch of one state is empty".into()))
+        let (mut found, _) =
+            self.batch(run, &placement, state..state + 1, &mut blake3::Hasher::new(), &mut Spent::default())?;
+        found.pop().ok_or_else(|| Error::Internal("a batch of one state is empty".into()))
     }
 
-    /// Projects a few states together; the block of Φ that is being read serves all of them.
+    /// Projects a few states together; the block of Φ that is being read serves all of them. Beside them the last shape.
     fn batch(
         &self,
         run: &Run,
@@ -258,7 +259,7 @@ impl<'a> Projector<'a> {
         states: std::ops::Range<usize>,
         hash: &mut blake3::Hasher,
         spent: &mut Spent,
-    ) -> Result<Vec<ProjectedState>, Error> {
+    ) -> Result<(Vec<ProjectedState>, Vec<Vector>), Error> {
         let Self { reference, basis, geometry, .. } = self;
         let mut clock = Clock::start();
         let mut shapes = Vec::with_capacity(states.len());
@@ -313,7 +314,7 @@ impl<'a> Projector<'a> {
             }
             projected.push(found);
         }
-        Ok(projected)
+        Ok((projected, shapes.pop().unwrap_or_default()))
     }
 
     /// Where the run's nodes and shells are; kept for the next run, which mostly has the same mesh.
@@ -473,15 +474,7 @@ impl<'a> Geometry<'a> {
                 spread += m * (p[i] * p[i] + q[i] * q[i]);
             }
         }
-        let [[xx, xy, xz], [yx, yy, yz], [zx, zy, zz]] = s;
-        let horn = [
-            [xx + yy + zz, yz - zy, zx - xz, xy - yx],
-            [yz - zy, xx - yy - zz, xy + yx, zx + xz],
-            [zx - xz, xy + yx, yy - xx - zz, yz + zy],
-            [xy - yx, zx + xz, yz + zy, zz - xx - yy],
-        ];
-        let horn = Mat::from_fn(4, 4, |i, j| horn[i][j]);
-        let largest = horn
+        let largest = rotation::horn(&s)
             .self_adjoint_eigenvalues(faer::Side::Lower)
             .ok()
             .and_then(|values| values.last().copied())

@@ -169,29 +169,12 @@ impl Comparer {
     /// # Errors
     /// [`Error::UnknownField`] if it lacks what is compared.
     pub fn score_target(&self, target: &Target) -> Result<Score, Error> {
-        let numbers = self.numbers(target)?;
-        Ok(self.score_numbers(numbers))
-    }
-
-    /// The numbers of a state that was named or projected, as they are compared but for centring and weights.
-    ///
-    /// # Errors
-    /// [`Error::UnknownField`] if it lacks what is compared.
-    pub fn numbers(&self, target: &Target) -> Result<Vec<f64>, Error> {
-        let needs = self.features.needs();
-        let values: Vec<Vec<f32>> = needs.iter().map(|need| target.on(need)).collect::<Result<_, _>>()?;
-        let stored: Vec<Stored<'_>> =
-            needs.iter().zip(&values).map(|(need, values)| Stored { values, rms: target.rms(need.function) }).collect();
-        Ok(self.features.vector(&stored))
+        Ok(self.score(&self.features.sample(target)?.stored(0)))
     }
 
     /// Compares one state. `stored`: one entry for each of [`Features::needs`].
     pub fn score(&self, stored: &[Stored<'_>]) -> Score {
-        self.score_numbers(self.features.vector(stored))
-    }
-
-    fn score_numbers(&self, numbers: Vec<f64>) -> Score {
-        let value = self.transform(numbers);
+        let value = self.transform(self.features.vector(stored));
         match self.metric {
             Metric::Cosine => {
                 let similarity = cosine(&self.target, &value);
@@ -221,8 +204,8 @@ impl Comparer {
         values
     }
 
-    /// Every state of these rows against the target, best first.
-    fn rank(&self, samples: &Samples) -> Vec<Hit> {
+    /// Every state of these rows, read as [`Comparer::features`] say, against the target, best first.
+    pub(crate) fn rank(&self, samples: &Samples) -> Vec<Hit> {
         let hit = |row: usize| Hit {
             run: samples.run(row).to_owned(),
             state: samples.state(row),

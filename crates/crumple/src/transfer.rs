@@ -25,23 +25,23 @@ const NEAR: f64 = 0.02;
 /// # Errors
 /// Those of reading the run it was made from.
 pub fn transfer(from: &Loaded, to: &Loaded, descriptor: &Descriptor) -> Result<(Descriptor, bool), Error> {
-    let named = Named { run: descriptor.run.clone(), state: Some(descriptor.state) };
     let mut spectrum = descriptor.spectrum.clone();
-    let direction = match map(from, to) {
-        Some(map) if to.basis.id != from.basis.id => {
-            let rho = resolve(from, &named)?.rotation;
-            let carried: Vec<Vector> = map
-                .iter()
-                .map(|row| std::array::from_fn(|c| row.iter().zip(&rho).map(|(weight, rho)| weight * rho[c]).sum()))
-                .collect();
-            // The energy is the query's own, in the mass that its coefficients have now.
-            Ruler::of(&to.basis).direction(&carried, spectrum.turn * to.basis.total_mass().sqrt())
-        }
-        Some(_) => spectrum.direction.clone(),
-        None => Vec::new(),
-    };
-    let carried = !direction.is_empty();
-    spectrum.direction = direction;
+    if to.basis.id != from.basis.id {
+        spectrum.direction = match map(from, to) {
+            Some(map) => {
+                let named = Named { run: descriptor.run.clone(), state: Some(descriptor.state) };
+                let rho = resolve(from, &named)?.rotation;
+                let carried: Vec<Vector> = map
+                    .iter()
+                    .map(|row| std::array::from_fn(|c| row.iter().zip(&rho).map(|(weight, rho)| weight * rho[c]).sum()))
+                    .collect();
+                // The energy is the query's own, in the mass that its coefficients have now.
+                Ruler::of(&to.basis).direction(&carried, spectrum.turn * to.basis.total_mass().sqrt())
+            }
+            None => Vec::new(),
+        };
+    }
+    let carried = !spectrum.direction.is_empty();
     let descriptor = Descriptor { kind: Kind::Rotation, basis: to.basis.id.clone(), spectrum, ..descriptor.clone() };
     Ok((descriptor, carried))
 }
@@ -66,7 +66,7 @@ fn map(from: &Loaded, to: &Loaded) -> Option<Vec<Vec<f64>>> {
         return None;
     }
     let sampled_mass: f64 = here.iter().map(|&vertex| to.basis.mass[vertex]).sum();
-    let scale = to.basis.mass.iter().sum::<f64>() / sampled_mass;
+    let scale = to.basis.total_mass() / sampled_mass;
     let entry = |j: usize, k: usize| -> f64 {
         let (phi, other) = (to.basis.eigenvector(j), from.basis.eigenvector(k));
         let product = |(&vertex, &(near, _)): (&usize, &(usize, f64))| {

@@ -36,9 +36,14 @@ pub(crate) fn area(corners: [Vector; 3]) -> f64 {
     square(double_area(corners)).sqrt() / 2.0
 }
 
+/// Inner product in any dimension.
+pub(crate) fn product(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
 /// Of length 1; a zero vector, of any dimension, stays zero.
 pub(crate) fn unit(mut numbers: Vec<f64>) -> Vec<f64> {
-    let length = numbers.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let length = product(&numbers, &numbers).sqrt();
     if length > 0.0 {
         numbers.iter_mut().for_each(|x| *x /= length);
     }

@@ -17,17 +17,8 @@ pub(crate) enum Include {
 /// What *INCLUDE_TRANSFORM does.
 #[derive(Debug, Clone)]
 pub(crate) struct Change {
-    node: i64,
-    element: i64,
-    part: i64,
-    material: i64,
-    set: i64,
-    define: i64,
-    other: i64,
-    prefix: String,
-    suffix: String,
-    /// Factor of lengths; 1 where none is given.
-    pub(crate) length: f64,
+    /// What it adds, and the factor of lengths.
+    pub(crate) own: Frame,
     /// Id of the transformation; 0 for none.
     pub(crate) transformation: u64,
 }
@@ -35,18 +26,18 @@ pub(crate) struct Change {
 impl Change {
     /// The frame inside the include.
     pub(crate) fn inside(&self, outside: &Frame) -> Frame {
-        let add = i64::saturating_add;
+        let (add, own) = (i64::saturating_add, &self.own);
         Frame {
-            node: add(outside.node, self.node),
-            element: add(outside.element, self.element),
-            part: add(outside.part, self.part),
-            material: add(outside.material, self.material),
-            set: add(outside.set, self.set),
-            define: add(outside.define, self.define),
-            other: add(outside.other, self.other),
-            length: outside.length * self.length,
-            prefix: join(&outside.prefix, &self.prefix),
-            suffix: join(&self.suffix, &outside.suffix),
+            node: add(outside.node, own.node),
+            element: add(outside.element, own.element),
+            part: add(outside.part, own.part),
+            material: add(outside.material, own.material),
+            set: add(outside.set, own.set),
+            define: add(outside.define, own.define),
+            other: add(outside.other, own.other),
+            length: outside.length * own.length,
+            prefix: join(&outside.prefix, &own.prefix),
+            suffix: join(&own.suffix, &outside.suffix),
         }
     }
 }
@@ -105,43 +96,31 @@ fn names(block: &Block<'_>, most: usize) -> (Vec<(String, u64)>, usize) {
 
 /// The four cards behind the name; those that are left out change nothing.
 fn change(block: &Block<'_>, first: usize) -> Result<Change, Error> {
-    let mut change = Change {
-        node: 0,
-        element: 0,
-        part: 0,
-        material: 0,
-        set: 0,
-        define: 0,
-        other: 0,
-        prefix: String::new(),
-        suffix: String::new(),
-        length: 1.0,
-        transformation: 0,
-    };
+    let (mut own, mut transformation) = (Frame::default(), 0);
     let row = |index: usize| block.cards.get(first + index).map(|card| card.row(TENS, block.at));
     if let Some(row) = row(0) {
-        change.node = row.integer(0, "IDNOFF")?;
-        change.element = row.integer(1, "IDEOFF")?;
-        change.part = row.integer(2, "IDPOFF")?;
-        change.material = row.integer(3, "IDMOFF")?;
-        change.set = row.integer(4, "IDSOFF")?;
-        change.define = row.integer(6, "IDDOFF")?;
+        own.node = row.integer(0, "IDNOFF")?;
+        own.element = row.integer(1, "IDEOFF")?;
+        own.part = row.integer(2, "IDPOFF")?;
+        own.material = row.integer(3, "IDMOFF")?;
+        own.set = row.integer(4, "IDSOFF")?;
+        own.define = row.integer(6, "IDDOFF")?;
     }
     if let Some(row) = row(1) {
-        change.other = row.integer(0, "IDROFF")?;
-        change.prefix = row.text(2);
-        change.suffix = row.text(3);
+        own.other = row.integer(0, "IDROFF")?;
+        own.prefix = row.text(2);
+        own.suffix = row.text(3);
     }
     if let Some(row) = row(2) {
         // FCTTEM, a text, stands behind; a blank factor is one.
         let length = row.real(2, "FCTLEN")?;
-        change.length = if length == 0.0 { 1.0 } else { length };
+        own.length = if length == 0.0 { 1.0 } else { length };
     }
     if let Some(row) = row(3) {
-        change.transformation = match row.id(0, "TRANID")? {
+        transformation = match row.id(0, "TRANID")? {
             0 => 0,
             _ => row.moved(0, "TRANID", block.frame.define)?,
         };
     }
-    Ok(change)
+    Ok(Change { own, transformation })
 }

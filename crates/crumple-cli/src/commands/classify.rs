@@ -42,7 +42,7 @@ impl Classify {
         };
         let results: Vec<Judged> = self.runs.iter().map(judge).collect::<Result<_, Error>>()?;
         for judged in &results {
-            judged.warnings.iter().for_each(|warning| output.note(&format!("{}: {warning}", judged.run)));
+            output.notes_on(&judged.run, &judged.warnings);
         }
         let evidence = classifier.evidence;
         output.print(&json!({ "kind": kind, "results": results, "evidence": evidence }), || {

@@ -38,7 +38,7 @@ impl Distance {
         let target = resolve(&loaded, &Named::in_study(&loaded.study, &self.run))?;
         let score = comparer.score_target(&target)?;
         let warnings = target.caveats(descriptor.time);
-        warnings.iter().for_each(|warning| output.note(&format!("{}: {warning}", target.run)));
+        output.notes_on(&target.run, &warnings);
         let facts = json!({ "descriptor": descriptor.name, "kind": options.kind_for(&descriptor), "run": target.run, "state": target.state, "time": target.time, "distance": score.distance, "similarity": score.similarity, "warnings": warnings });
         output.print(&facts, || score.distance.to_string());
         Ok(Answer::Done)

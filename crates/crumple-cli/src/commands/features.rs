@@ -60,8 +60,9 @@ impl Features {
             None => maker.study(which)?,
             Some(run) => {
                 let target = resolve(&loaded, &Named::in_study(&loaded.study, run))?;
-                let caveats = descriptor.as_ref().map_or(Vec::new(), |descriptor| target.caveats(descriptor.time));
-                caveats.iter().for_each(|caveat| output.note(&format!("{}: {caveat}", target.run)));
+                if let Some(descriptor) = &descriptor {
+                    output.notes_on(&target.run, &target.caveats(descriptor.time));
+                }
                 maker.target(&target)?
             }
         };

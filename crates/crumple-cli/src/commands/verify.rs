@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use crumple::Error;
-use crumple::calibrate::{calibrate, nearest_known};
+use crumple::calibrate::{Known, calibrate};
 use crumple::descriptor::{self, Calibration, Descriptor};
 use crumple::inputs::Table;
 use crumple::modes;
@@ -76,20 +76,24 @@ impl Verify {
         let kind = options.kind_for(&descriptor);
         let calibration = descriptor.calibration.as_ref().filter(|found| found.kind == kind && options == plain);
         let threshold = self.threshold.or(calibration.map(|found| found.threshold)).unwrap_or(0.9);
+        let known = match calibration {
+            Some(found) => Some((found.known, Known::of(&loaded, &comparer)?)),
+            None => None,
+        };
         let judge = |run: &String| {
             let target = resolve(&loaded, &Named::in_study(&loaded.study, run))?;
             let score = comparer.score_target(&target)?;
             let warnings = target.caveats(descriptor.time);
             let pass = score.similarity >= threshold;
-            let known = match calibration {
-                Some(found) => Some(nearest_known(&loaded, &comparer, &target)? >= found.known),
+            let known = match &known {
+                Some((limit, known)) => Some(known.nearest(&target)? >= *limit),
                 None => None,
             };
             Ok(Judged { run: target.run, state: target.state, time: target.time, score, pass, known, warnings })
         };
         let results: Vec<Judged> = self.runs.iter().map(judge).collect::<Result<_, Error>>()?;
         for judged in &results {
-            judged.warnings.iter().for_each(|warning| output.note(&format!("{}: {warning}", judged.run)));
+            output.notes_on(&judged.run, &judged.warnings);
         }
         let facts = json!({
             "descriptor": descriptor.name, "kind": kind, "threshold": threshold, "calibrated": calibration.is_some(),

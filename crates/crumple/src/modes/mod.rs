@@ -40,6 +40,7 @@ pub use parting::{APART, Apart, Parting};
 pub(crate) use points::{Distances, Points, square_distance};
 
 use crate::Error;
+use crate::basis::Basis;
 use crate::study::Study;
 use evidence::{mean_silhouette, silhouettes};
 use group::Grouper;
@@ -151,7 +152,25 @@ pub struct Tried {
 /// errors.
 pub fn modes(study: &Study, options: &ModesOptions, watch: &dyn Watch) -> Result<Modes, Error> {
     let basis = study.basis()?;
-    let total_mass = basis.total_mass();
+    let mut found = groups(study, &basis, options, watch)?;
+    inputs::inputs(study.manifest(), &mut found.modes, options.seed);
+    match parting::partings(study, options.by, &basis, &found.modes)? {
+        Ok(partings) => found.partings = partings,
+        Err(why) => found.notes.push(why),
+    }
+    match load(study) {
+        Ok(before) => found.keep(before.names),
+        Err(Error::NoModes) => {}
+        Err(error) => found.notes.push(format!("names that modes had are lost: {error}")),
+    }
+    Ok(found)
+}
+
+/// The modes alone, numbered: without the inputs that go with them, the states at which they part and names of before.
+///
+/// # Errors
+/// As [`modes`].
+pub(crate) fn groups(study: &Study, basis: &Basis, options: &ModesOptions, watch: &dyn Watch) -> Result<Modes, Error> {
     if study.manifest().runs.len() < RUNS_MIN {
         let have = study.manifest().runs.len();
         return Err(Error::TooFewRuns { what: "grouping into modes", needed: RUNS_MIN, have });
@@ -161,14 +180,14 @@ pub fn modes(study: &Study, options: &ModesOptions, watch: &dyn Watch) -> Result
     {
         return Err(crate::target::unknown_field(field, study.settings().fields.iter().copied()));
     }
-    let sampled = states::sample(study, options.by, &options.states, total_mass)?;
+    let sampled = states::sample(study, options.by, &options.states, basis.total_mass())?;
     let runs = sampled.runs.len();
     if runs < RUNS_MIN {
         let what = "grouping into modes by states that all runs reach";
         return Err(Error::TooFewRuns { what, needed: RUNS_MIN, have: runs });
     }
     check(options, runs)?;
-    let points = Points::of(options.by, &sampled.rows, sampled.per_run, &basis);
+    let points = Points::of(options.by, &sampled.rows, sampled.per_run, basis);
     let distances = points.distances();
     let smallest = options.smallest.unwrap_or((runs / 4).clamp(2, 5));
     let grouper = Grouper::new(&points, &distances, options.method, options.seed, smallest);
@@ -201,16 +220,6 @@ pub fn modes(study: &Study, options: &ModesOptions, watch: &dyn Watch) -> Result
     let mut found = assemble::assemble(&sampled, &points, &distances, &grouping, options);
     found.notes.extend(doubts(&tried[best], &found, runs));
     found.tried = tried;
-    inputs::inputs(study.manifest(), &mut found.modes, options.seed);
-    match parting::partings(study, options.by, &basis, &found.modes)? {
-        Ok(partings) => found.partings = partings,
-        Err(why) => found.notes.push(why),
-    }
-    match load(study) {
-        Ok(before) => found.keep(before.names),
-        Err(Error::NoModes) => {}
-        Err(error) => found.notes.push(format!("names that modes had are lost: {error}")),
-    }
     Ok(found)
 }
 

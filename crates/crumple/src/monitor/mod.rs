@@ -261,11 +261,7 @@ impl<'a> Tracker<'a> {
     /// # Errors
     /// [`Error::UnknownField`] if it lacks what is compared.
     pub fn place(&self, target: &Target) -> Result<Place, Error> {
-        let needs = self.features.needs();
-        let values: Vec<Vec<f32>> = needs.iter().map(|need| target.on(need)).collect::<Result<_, _>>()?;
-        let stored: Vec<Stored<'_>> =
-            needs.iter().zip(&values).map(|(need, values)| Stored { values, rms: target.rms(need.function) }).collect();
-        Ok(self.put(&stored, target.time, target.rms))
+        Ok(self.put(&self.features.sample(target)?.stored(0), target.time, target.rms))
     }
 
     /// The paths of runs of the study, by run id.

@@ -14,11 +14,12 @@ use super::words::{deck_words, isometry_words, join_words, mode_words, warnings}
 use crate::Error;
 use crate::descriptor::{self, DescribeOptions, Described, FIRST_M, Rival, Threshold, describe};
 use crate::explain::spectrum_words;
+use crate::features::Features;
 use crate::joints::Join;
 use crate::modes::{By, Mode, Modes, Tried};
 use crate::reconstruct::Errors;
 use crate::select::Kind;
-use crate::similarity::{Hit, SimilarityOptions, search};
+use crate::similarity::{Comparer, Hit, SimilarityOptions, search};
 use crate::study::{Loaded, Rows, RunRecord};
 use crate::target::Named;
 
@@ -266,15 +267,14 @@ fn study_facts(loaded: &Loaded) -> StudyFacts {
 
 /// Every run's similarity to every mode's descriptor, best first, by rotation and by the paper's kind.
 fn similarities(loaded: &Loaded, described: &[Described]) -> Result<Vec<Similarities>, Error> {
+    // Every descriptor compares the whole rotation spectrum: it is read once.
+    let turned = Features::rotation(&loaded.basis).read(&loaded.study, Rows::Last)?;
     let of = |described: &Described| {
-        let by = |kind| {
-            let options = SimilarityOptions { kind: Some(kind), ..Default::default() };
-            search(loaded, &described.descriptor, options, Rows::Last)
-        };
+        let options = |kind| SimilarityOptions { kind: Some(kind), ..Default::default() };
         Ok(Similarities {
             mode: described.descriptor.name.clone(),
-            rotation: by(Kind::Rotation)?,
-            paper: by(Kind::Paper)?,
+            rotation: Comparer::new(loaded, &described.descriptor, options(Kind::Rotation))?.rank(&turned),
+            paper: search(loaded, &described.descriptor, options(Kind::Paper), Rows::Last)?,
         })
     };
     described.iter().map(of).collect()

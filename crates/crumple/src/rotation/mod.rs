@@ -161,18 +161,11 @@ pub struct Health {
 /// The rotation R that is nearest to a sum of rotations, max tr(Rᵀ B): their mean in the chordal metric (Moakher 2002),
 /// by the quaternion of Horn 1987. The identity for B = 0.
 fn nearest_to(b: &Matrix) -> Matrix {
-    let [[xx, xy, xz], [yx, yy, yz], [zx, zy, zz]] = *b;
-    let horn = [
-        [xx + yy + zz, yz - zy, zx - xz, xy - yx],
-        [yz - zy, xx - yy - zz, xy + yx, zx + xz],
-        [zx - xz, xy + yx, yy - xx - zz, yz + zy],
-        [xy - yx, zx + xz, yz + zy, zz - xx - yy],
-    ];
     let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    let Ok(spectrum) = Mat::from_fn(4, 4, |i, j| horn[i][j]).self_adjoint_eigen(Side::Lower) else { return identity };
     if b.as_flattened().iter().all(|&x| x == 0.0) {
         return identity;
     }
+    let Ok(spectrum) = horn(b).self_adjoint_eigen(Side::Lower) else { return identity };
     let best = spectrum.U().col(3);
     let [w, x, y, z] = [best[0], best[1], best[2], best[3]];
     [
@@ -180,6 +173,19 @@ fn nearest_to(b: &Matrix) -> Matrix {
         [2.0 * (x * y - w * z), w * w - x * x + y * y - z * z, 2.0 * (y * z + w * x)],
         [2.0 * (x * z + w * y), 2.0 * (y * z - w * x), w * w - x * x - y * y + z * z],
     ]
+}
+
+/// The symmetric 4 × 4 matrix of Horn 1987 for a cross-covariance S = Σ p qᵀ: its largest eigenvalue is the maximum of
+/// tr(R S) over rotations R, and the eigenvector of it the quaternion of that rotation.
+pub(crate) fn horn(s: &Matrix) -> Mat<f64> {
+    let [[xx, xy, xz], [yx, yy, yz], [zx, zy, zz]] = *s;
+    let entries = [
+        [xx + yy + zz, yz - zy, zx - xz, xy - yx],
+        [yz - zy, xx - yy - zz, xy + yx, zx + xz],
+        [zx - xz, xy + yx, yy - xx - zz, yz + zy],
+        [xy - yx, zx + xz, yz + zy, zz - xx - yy],
+    ];
+    Mat::from_fn(4, 4, |i, j| entries[i][j])
 }
 
 #[cfg(test)]

@@ -110,10 +110,10 @@ impl Reader<'_> {
         }
         let nodes = first..self.deck.node_ids.len();
         if let Some(change) = change
-            && (change.length != 1.0 || change.transformation != 0)
+            && (change.own.length != 1.0 || change.transformation != 0)
         {
             let transformation = change.transformation;
-            self.moves.push(Move { nodes, length: change.length, transformation, include: here });
+            self.moves.push(Move { nodes, length: change.own.length, transformation, include: here });
         }
         Ok(())
     }

@@ -7,6 +7,7 @@ use crate::eigen::finish::Evidence;
 use crate::eigen::output::eigenvectors;
 use crate::eigen::seconds::Seconds;
 use crate::eigen::slice::ROUNDING;
+use crate::eigen::{EigenError, EigenOptions};
 use crate::operator::Operator;
 
 /// The K lowest eigenpairs of L φ = λ M φ on a mesh of N vertices.
@@ -109,54 +110,104 @@ pub(crate) fn merge(
     let eigenvalue = |&(number, k): &(usize, usize)| solved[number].eigenvalues[k];
     order.sort_by(|a, b| eigenvalue(a).total_cmp(&eigenvalue(b)).then(a.cmp(b)));
     let eigenvalues: Vec<f64> = order.iter().map(eigenvalue).collect();
-    let counts: Vec<InertiaCount> = solved
-        .iter()
-        .enumerate()
-        .flat_map(|(component, pairs)| {
-            pairs.counts.iter().map(move |&(shift, below_expected, below_counted)| InertiaCount {
-                component,
-                shift,
-                below_expected,
-                below_counted,
-            })
-        })
-        .collect();
-    let dense = solved.iter().filter(|pairs| pairs.dense).count();
-    let sliced = solved.len() - dense;
+    let measured = Measured {
+        residual: evidence.iter().map(|evidence| evidence.residual).fold(0.0, f64::max),
+        orthogonality: evidence.iter().map(|evidence| evidence.orthogonality).fold(0.0, f64::max),
+        norm: components.iter().map(|component| component.norm).fold(0.0, f64::max),
+        next,
+        counts: counts(solved.iter().map(|pairs| &pairs.counts[..])),
+        components: components.len(),
+        dense: solved.iter().filter(|pairs| pairs.dense).count(),
+    };
     let eigenvectors = eigenvectors(operator, components, solved, evidence, &order);
+    Eigenbasis::new(eigenvalues, eigenvectors, vertices, measured, tolerance)
+}
 
-    let norm = components.iter().map(|component| component.norm).fold(0.0, f64::max);
-    let scale = eigenvalues.last().copied().filter(|&last| last > 0.0).unwrap_or(norm).max(f64::MIN_POSITIVE);
-    let cluster_gap = 100.0 * tolerance * scale;
-    let clusters = ranges(&eigenvalues, |_| cluster_gap);
-    let sensitive = ranges(&eigenvalues, |eigenvalue| cluster_gap.max(1e-3 * eigenvalue));
-    Eigenbasis {
-        certificate: Certificate {
-            residual_max: evidence.iter().map(|evidence| evidence.residual).fold(0.0, f64::max) / scale,
-            residual_floor: ROUNDING * norm / scale,
-            orthogonality: evidence.iter().map(|evidence| evidence.orthogonality).fold(0.0, f64::max),
-            complete: counts.iter().all(|count| count.below_expected == count.below_counted),
-            counts,
-            components: components.len(),
-            next_eigenvalue: next,
-            cluster_cut: next.zip(eigenvalues.last()).is_some_and(|(next, last)| next - last <= cluster_gap),
-            method: if sliced == 0 {
-                Method::Dense
-            } else if dense == 0 {
-                Method::Sliced
-            } else {
-                Method::Mixed
+/// What was counted and measured while a basis was computed.
+pub(crate) struct Measured {
+    /// max ‖L φ − λ M φ‖ in the M⁻¹ norm.
+    pub(crate) residual: f64,
+    /// max |Φᵀ M Φ − I|.
+    pub(crate) orthogonality: f64,
+    /// ‖M^-½ L M^-½‖∞.
+    pub(crate) norm: f64,
+    /// λ_{K+1}.
+    pub(crate) next: Option<f64>,
+    pub(crate) counts: Vec<InertiaCount>,
+    pub(crate) components: usize,
+    /// Components solved by the dense solver.
+    pub(crate) dense: usize,
+}
+
+/// The counts of all components, from the shifts of each with the eigenvalues found and counted below them.
+pub(crate) fn counts<'a>(components: impl Iterator<Item = &'a [(f64, usize, usize)]>) -> Vec<InertiaCount> {
+    let of_component = |(component, counts): (usize, &'a [(f64, usize, usize)])| {
+        counts.iter().map(move |&(shift, below_expected, below_counted)| InertiaCount {
+            component,
+            shift,
+            below_expected,
+            below_counted,
+        })
+    };
+    components.enumerate().flat_map(of_component).collect()
+}
+
+impl Eigenbasis {
+    /// A basis with its clusters and its certificate; what the work cost is not known here.
+    pub(crate) fn new(
+        eigenvalues: Vec<f64>,
+        eigenvectors: Vec<f64>,
+        vertices: usize,
+        measured: Measured,
+        tolerance: f64,
+    ) -> Eigenbasis {
+        let Measured { residual, orthogonality, norm, next, counts, components, dense } = measured;
+        let scale = eigenvalues.last().copied().filter(|&last| last > 0.0).unwrap_or(norm).max(f64::MIN_POSITIVE);
+        let cluster_gap = 100.0 * tolerance * scale;
+        Eigenbasis {
+            clusters: ranges(&eigenvalues, |_| cluster_gap),
+            sensitive: ranges(&eigenvalues, |eigenvalue| cluster_gap.max(1e-3 * eigenvalue)),
+            certificate: Certificate {
+                residual_max: residual / scale,
+                residual_floor: ROUNDING * norm / scale,
+                orthogonality,
+                complete: counts.iter().all(|count| count.below_expected == count.below_counted),
+                counts,
+                components,
+                next_eigenvalue: next,
+                cluster_cut: next.zip(eigenvalues.last()).is_some_and(|(next, last)| next - last <= cluster_gap),
+                method: if dense == components {
+                    Method::Dense
+                } else if dense == 0 {
+                    Method::Sliced
+                } else {
+                    Method::Mixed
+                },
+                factorisations: 0,
+                solves: 0,
+                peak_bytes: 0,
+                seconds: Seconds::default(),
             },
-            factorisations: 0,
-            solves: 0,
-            peak_bytes: 0,
-            seconds: Seconds::default(),
-        },
-        eigenvalues,
-        eigenvectors,
-        vertices,
-        clusters,
-        sensitive,
+            eigenvalues,
+            eigenvectors,
+            vertices,
+        }
+    }
+
+    /// Whether it is what was promised.
+    ///
+    /// # Errors
+    /// [`EigenError::Residual`], [`EigenError::NotOrthogonal`].
+    pub(crate) fn checked(self, options: &EigenOptions) -> Result<Eigenbasis, EigenError> {
+        let &EigenOptions { tolerance, orthogonality, .. } = options;
+        let Certificate { residual_max: residual, residual_floor: floor, orthogonality: loss, .. } = self.certificate;
+        if residual.is_nan() || residual > tolerance.max(floor) {
+            return Err(EigenError::Residual { residual, tolerance, floor });
+        }
+        if loss.is_nan() || loss > orthogonality.allowed() {
+            return Err(EigenError::NotOrthogonal { loss });
+        }
+        Ok(self)
     }
 }
 

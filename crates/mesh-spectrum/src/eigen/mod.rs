@@ -266,9 +266,7 @@ impl<'a> Progress<'a> {
 /// are not interrupted: less than a second for meshes of up to some hundred thousand vertices.
 pub fn eigenbasis(operator: &Operator, options: &EigenOptions, watch: &dyn Watch) -> Result<Eigenbasis, EigenError> {
     if let Some(mass) = &operator.mass_matrix {
-        let mut basis = general::eigenbasis(operator, mass, options, watch)?;
-        operator.fill_followers(&mut basis.eigenvectors);
-        return Ok(basis);
+        return general::eigenbasis(operator, mass, options, watch);
     }
     let &EigenOptions { tolerance, seed, dense_below, orthogonality, instructions, memory_limit, .. } = options;
     let kind = instructions.kind();
@@ -313,13 +311,7 @@ pub fn eigenbasis(operator: &Operator, options: &EigenOptions, watch: &dyn Watch
     basis.certificate.factorisations = clock.times(Step::Factor);
     basis.certificate.solves = WIDTH * clock.times(Step::Solve);
     basis.certificate.peak_bytes = expected;
-    let Certificate { residual_max: residual, residual_floor: floor, orthogonality: loss, .. } = basis.certificate;
-    if residual.is_nan() || residual > tolerance.max(floor) {
-        return Err(EigenError::Residual { residual, tolerance, floor });
-    }
-    if loss.is_nan() || loss > orthogonality.allowed() {
-        return Err(EigenError::NotOrthogonal { loss });
-    }
+    let basis = basis.checked(options)?;
     progress.add(0);
     Ok(basis)
 }

@@ -5,10 +5,10 @@ use faer::{Accum, Mat, MatRef, Par};
 
 use super::Pairs;
 use super::pencil::{Pencil, times};
-use crate::eigen::basis::{Certificate, Eigenbasis, InertiaCount, Method, ranges};
+use crate::eigen::basis::{Eigenbasis, Measured, counts};
 use crate::eigen::output::fix_sign;
-use crate::eigen::seconds::{Seconds, Step};
-use crate::eigen::slice::{ROUNDING, Trouble, norm};
+use crate::eigen::seconds::Step;
+use crate::eigen::slice::{Trouble, norm};
 use crate::eigen::{EigenError, EigenOptions, Progress};
 use crate::operator::Operator;
 
@@ -131,7 +131,6 @@ pub(super) fn finish(
     (count, options): (usize, &EigenOptions),
     progress: &Progress,
 ) -> Result<Eigenbasis, EigenError> {
-    let tolerance = options.tolerance;
     for (pencil, pairs) in pencils.iter().zip(&mut solved).filter(|(_, pairs)| pairs.dense) {
         pairs.eigenvalues.iter_mut().enumerate().for_each(|(k, e)| *e = if k == 0 { 0.0 } else { e.max(0.0) });
         let again = orthonormalise(pencil, &pairs.eigenvalues, &mut pairs.vectors, progress);
@@ -178,56 +177,16 @@ pub(super) fn finish(
         measured = (measured.0.max(residual), measured.1.max(loss));
     }
 
-    let norm = pencils.iter().map(Pencil::norm).fold(0.0, f64::max);
-    let scale = eigenvalues.last().copied().filter(|&last| last > 0.0).unwrap_or(norm).max(f64::MIN_POSITIVE);
-    let (residual, floor, loss) = (measured.0 / scale, ROUNDING * norm / scale, measured.1);
-    if residual.is_nan() || residual > tolerance.max(floor) {
-        return Err(EigenError::Residual { residual, tolerance, floor });
-    }
-    if loss.is_nan() || loss > options.orthogonality.allowed() {
-        return Err(EigenError::NotOrthogonal { loss });
-    }
-    let gap = 100.0 * tolerance * scale;
-    let inertia = |(component, &(shift, below_expected, below_counted))| InertiaCount {
-        component,
-        shift,
-        below_expected,
-        below_counted,
+    let measured = Measured {
+        residual: measured.0,
+        orthogonality: measured.1,
+        norm: pencils.iter().map(Pencil::norm).fold(0.0, f64::max),
+        next,
+        counts: counts(solved.iter().map(|pairs| &pairs.counts[..])),
+        components: pencils.len(),
+        dense: solved.iter().filter(|pairs| pairs.dense).count(),
     };
-    let counts: Vec<InertiaCount> = solved
-        .iter()
-        .enumerate()
-        .flat_map(|(number, pairs)| pairs.counts.iter().map(move |count| (number, count)))
-        .map(inertia)
-        .collect();
-    let dense = solved.iter().filter(|pairs| pairs.dense).count();
+    let basis = Eigenbasis::new(eigenvalues, eigenvectors, vertices, measured, options.tolerance).checked(options)?;
     progress.add(0);
-    Ok(Eigenbasis {
-        clusters: ranges(&eigenvalues, |_| gap),
-        sensitive: ranges(&eigenvalues, |eigenvalue| gap.max(1e-3 * eigenvalue)),
-        certificate: Certificate {
-            residual_max: residual,
-            residual_floor: floor,
-            orthogonality: loss,
-            complete: counts.iter().all(|count| count.below_expected == count.below_counted),
-            counts,
-            components: pencils.len(),
-            next_eigenvalue: next,
-            cluster_cut: next.zip(eigenvalues.last()).is_some_and(|(next, last)| next - last <= gap),
-            method: if dense == solved.len() {
-                Method::Dense
-            } else if dense == 0 {
-                Method::Sliced
-            } else {
-                Method::Mixed
-            },
-            factorisations: 0,
-            solves: 0,
-            peak_bytes: 0,
-            seconds: Seconds::default(),
-        },
-        eigenvalues,
-        eigenvectors,
-        vertices,
-    })
+    Ok(basis)
 }
