@@ -3,31 +3,36 @@
 use crate::eigen::chain::Found;
 use crate::eigen::slice::{CUT_GAP, Trouble};
 
-/// Joins the chains of one component, in ascending order, each pair taken from one of them. Result: eigenvalues, and
-/// the places of their vectors, a chain's places counted from `starts`.
+/// Pairs of one component, in ascending order.
+#[derive(Debug, Default)]
+pub(crate) struct Joined {
+    pub(crate) eigenvalues: Vec<f64>,
+    /// Where each one's vector is, among the blocks of all chains.
+    pub(crate) places: Vec<usize>,
+    /// ‖A x − λ x‖ of each.
+    pub(crate) residuals: Vec<f64>,
+}
+
+/// Joins the chains of one component, each pair taken from one of them; a chain's places are counted from `starts`.
 ///
 /// Around the value where two chains meet, both number their pairs from the inertia count there. Where both found a
 /// pair of the same number, its eigenvalues must agree: had either missed one, the numbers would be shifted.
-pub(crate) fn assemble(
-    chains: &[Found],
-    starts: &[usize],
-    top: f64,
-    tolerance: f64,
-) -> Result<(Vec<f64>, Vec<usize>), Trouble> {
+pub(crate) fn assemble(chains: &[Found], starts: &[usize], top: f64, tolerance: f64) -> Result<Joined, Trouble> {
     let mut borders = vec![chains.first().map_or(0, |chain| chain.first)];
     for pair in chains.windows(2) {
         borders.push(border(&pair[0], &pair[1], top, tolerance)?);
     }
     borders.extend(chains.last().map(Found::end));
 
-    let (mut eigenvalues, mut places) = (Vec::new(), Vec::new());
+    let mut joined = Joined::default();
     for ((chain, start), ends) in chains.iter().zip(starts).zip(borders.windows(2)) {
         for number in ends[0]..ends[1] {
-            eigenvalues.push(chain.eigenvalues[number - chain.first]);
-            places.push(start + chain.places[number - chain.first]);
+            joined.eigenvalues.push(chain.eigenvalues[number - chain.first]);
+            joined.places.push(start + chain.places[number - chain.first]);
+            joined.residuals.push(chain.residuals[number - chain.first]);
         }
     }
-    Ok((eigenvalues, places))
+    Ok(joined)
 }
 
 /// The number of the first pair to take from the right chain.
@@ -86,8 +91,8 @@ mod tests {
     use super::*;
 
     fn chain(first: usize, eigenvalues: &[f64]) -> Found {
-        let places = (0..eigenvalues.len()).collect();
-        Found { first, eigenvalues: eigenvalues.to_vec(), places, counts: Vec::new() }
+        let (places, residuals) = ((0..eigenvalues.len()).collect(), vec![0.0; eigenvalues.len()]);
+        Found { first, eigenvalues: eigenvalues.to_vec(), places, residuals, counts: Vec::new() }
     }
 
     #[test]
@@ -95,7 +100,7 @@ mod tests {
         let left = chain(0, &[0.0, 1.0, 2.0, 3.5, 3.6]);
         let right = chain(2, &[2.0, 3.5, 3.6, 4.0]);
         assert_eq!(border(&left, &right, 4.0, 1e-10).unwrap(), 3);
-        let (eigenvalues, places) = assemble(&[left, right], &[0, 8], 4.0, 1e-10).unwrap();
+        let Joined { eigenvalues, places, .. } = assemble(&[left, right], &[0, 8], 4.0, 1e-10).unwrap();
         assert_eq!(eigenvalues, [0.0, 1.0, 2.0, 3.5, 3.6, 4.0]);
         assert_eq!(places, [0, 1, 2, 9, 10, 11]);
     }

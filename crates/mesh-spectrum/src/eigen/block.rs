@@ -6,6 +6,8 @@
 use std::ops::{Deref, DerefMut};
 use std::sync::{Mutex, PoisonError};
 
+use crate::eigen::pages;
+
 /// Vectors in a block. A wider block solves faster per vector and converges slower; 8 and 4 tie, 16 loses.
 pub(crate) const WIDTH: usize = 8;
 
@@ -30,9 +32,25 @@ pub(crate) struct Block {
 impl Block {
     /// So many rows of zeros.
     pub(crate) fn zeros(rows: usize) -> Block {
-        let memory = vec![0.0; rows * WIDTH + WIDTH - 1];
+        Block::aligned(rows, 64)
+    }
+
+    /// The same, for memory that is gone through again and again: in large pages, if it is large.
+    pub(crate) fn lasting(rows: usize) -> Block {
+        let page = pages::large(size_of::<Row>() * rows);
+        if page == 0 {
+            return Block::zeros(rows);
+        }
+        let block = Block::aligned(rows, page);
+        pages::advise(&block.memory[..block.offset + WIDTH * rows], block.offset);
+        block
+    }
+
+    fn aligned(rows: usize, bytes: usize) -> Block {
+        let most = bytes / size_of::<f64>() - 1;
+        let memory = vec![0.0; rows * WIDTH + most];
         // Where the allocator gives no way to align, the block works all the same, a little slower.
-        let offset = memory.as_ptr().align_offset(64).min(WIDTH - 1);
+        let offset = memory.as_ptr().align_offset(bytes).min(most);
         Block { memory, offset, rows }
     }
 
@@ -65,7 +83,7 @@ pub(crate) struct Pool {
 impl Pool {
     pub(crate) fn take(&self, rows: usize) -> Block {
         let free = self.free.lock().unwrap_or_else(PoisonError::into_inner).pop();
-        free.unwrap_or_else(|| Block::zeros(rows))
+        free.unwrap_or_else(|| Block::lasting(rows))
     }
 
     pub(crate) fn give(&self, blocks: impl IntoIterator<Item = Block>) {
@@ -140,9 +158,11 @@ mod tests {
 
     #[test]
     fn blocks_start_at_a_cache_line() {
-        for rows in [1, 5, 100, 10_000] {
-            let block = Block::zeros(rows);
-            assert_eq!((block.len(), block.as_ptr().addr() % 64), (rows, 0));
+        for rows in [1, 5, 100, 10_000, 100_000] {
+            for block in [Block::zeros(rows), Block::lasting(rows)] {
+                assert_eq!((block.len(), block.as_ptr().addr() % 64), (rows, 0));
+                assert!(block.iter().all(|row| *row == ZERO));
+            }
         }
     }
 }

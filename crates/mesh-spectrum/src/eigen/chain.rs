@@ -11,11 +11,18 @@ use crate::eigen::krylov::Handover;
 use crate::eigen::slice::{CUT_GAP, Demand, Tools, Trouble, slice};
 use crate::eigen::weyl::Weyl;
 
-/// Pairs on either side of a shift. Fewer: more factorisations; more: larger spaces. Between 28 and 40 the time is flat.
-pub(crate) const PAIRS_A_SIDE: usize = 32;
+/// Pairs on either side of a shift. Fewer: more factorisations, which cost more beside a solve the larger the mesh;
+/// more: larger spaces. Between 12 and 20 the time is flat to a tenth.
+fn pairs_a_side(rows: usize) -> usize {
+    match rows {
+        ..30_000 => 14,
+        30_000..300_000 => 16,
+        _ => 20,
+    }
+}
 
 /// Ritz vectors handed over, for each pair on a side: those that the next slice finds again, and those that help.
-const HAND_OVER: usize = 3;
+const HAND_OVER: usize = 4;
 
 /// The largest |L| and the smallest |D| (in mean spacings of eigenvalues) a shift is used with: above and below, the
 /// solve loses digits (measured: 10 % of the shifts are moved).
@@ -41,7 +48,7 @@ pub(crate) struct Span {
 }
 
 /// What a chain has found.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Found {
     /// The number of the first pair.
     pub(crate) first: usize,
@@ -49,22 +56,24 @@ pub(crate) struct Found {
     pub(crate) eigenvalues: Vec<f64>,
     /// Where each one's vector is: 8 × block + column.
     pub(crate) places: Vec<usize>,
+    /// ‖A x − λ x‖ of each.
+    pub(crate) residuals: Vec<f64>,
     /// Shifts, and the eigenvalues below each by inertia.
     pub(crate) counts: Vec<(f64, usize)>,
 }
 
 /// Blocks that a chain for so many pairs may use: the last block of every slice is not full.
-pub(crate) fn blocks_needed(pairs: usize) -> usize {
-    pairs.div_ceil(WIDTH) + slices_max(pairs)
+pub(crate) fn blocks_needed(rows: usize, pairs: usize) -> usize {
+    pairs.div_ceil(WIDTH) + slices_max(rows, pairs)
 }
 
 /// About so many slices find so many pairs.
-pub(crate) fn slices_expected(pairs: usize) -> usize {
-    ((pairs as f64 / (2 * PAIRS_A_SIDE) as f64).round() as usize).max(1)
+pub(crate) fn slices_expected(rows: usize, pairs: usize) -> usize {
+    ((pairs as f64 / (2 * pairs_a_side(rows)) as f64).round() as usize).max(1)
 }
 
-fn slices_max(pairs: usize) -> usize {
-    pairs / PAIRS_A_SIDE + 4
+fn slices_max(rows: usize, pairs: usize) -> usize {
+    pairs / pairs_a_side(rows) + 4
 }
 
 /// Finds the pairs of a span and writes their vectors into `blocks`.
@@ -76,32 +85,50 @@ pub(crate) fn chain(
     mut blocks: &mut [&mut [Row]],
 ) -> Result<Found, Trouble> {
     let Span { first, end, low, high, seed, attempt, border: _, border_count: _ } = span;
-    let careful = attempt > 0;
-    let mut found = Found { first, eigenvalues: Vec::new(), places: Vec::new(), counts: Vec::new() };
+    let rows = tools.matrix.rows();
+    let mut found = Found { first, ..Found::default() };
     let mut next_block = 0;
     let mut ahead: Vec<f64> = Vec::new();
     let mut handover: Option<Handover> = None;
     let mut dimension: Option<usize> = None;
+    // How often the slice has gone wrong, beyond the attempts before.
+    let mut again = 0;
     let (mut below, mut low) = (first, low);
-    for number in 0..slices_max(end - first) {
+    for number in 0..slices_max(rows, end - first) {
         let left_over = end - below;
-        let slices = slices_expected(left_over);
+        let slices = slices_expected(rows, left_over);
         let half = left_over.div_ceil(2 * slices).max(2);
         let wanted = guess(&ahead, half).unwrap_or_else(|| {
             let place = weyl.inverse((below + half) as f64) - weyl.inverse(below as f64);
             (low + place).min(0.5 * (low + high))
         });
         let seed = mix(seed, number as u64);
-        let factor = place_shift(tools, symbolic, wanted, (below, half), (low, high), attempt)?;
+        let factor = place_shift(tools, symbolic, wanted, (below, half), (low, high), attempt + again)?;
         let nu = factor.below;
         found.counts.push((factor.shift, nu));
         let left = nu.min(end) - below;
         let last = slices == 1 || nu + left.max(half) + half / 3 >= end;
         let right = if last { end.saturating_sub(nu) } else { left.max(half).min(end - nu) };
-        let demand = Demand { left: nu - below, right, last, seed, careful, dimension };
-        let slice = slice(tools, &factor, demand, handover.take())?;
-        // What a slice needed is what the next one will need; the first one, without a hand-over, needs more.
-        dimension = Some(if number == 0 { slice.dimension * 4 / 5 } else { slice.dimension });
+        let careful = attempt + again > 0;
+        let alone = handover.is_none();
+        let demand = Demand { left: nu - below, right, last, seed, careful, dimension: dimension.filter(|_| !careful) };
+        let done = slice(tools, &factor, demand, handover.take()).and_then(|slice| {
+            let count = slice.eigenvalues.len();
+            let own = blocks.get_mut(..count.div_ceil(WIDTH));
+            let own = own.ok_or_else(|| Trouble::Again("more slices than foreseen".into()))?;
+            Ok((slice.vectors(tools, own)?, slice))
+        });
+        let (residuals, slice) = match done {
+            // Once more with another shift, by itself, and with nothing left to an estimate.
+            Err(Trouble::Again(_)) if again == 0 => {
+                again = 1;
+                continue;
+            }
+            done => done?,
+        };
+        // What a slice needed is what the next one will need; one without a hand-over needs more.
+        dimension = Some(if alone { slice.dimension * 4 / 5 } else { slice.dimension });
+        again = 0;
 
         // The slice before knew which eigenvalue comes next. Another one here means that one of both missed a pair.
         let near = |a: f64, b: f64| (a - b).abs() <= 10.0 * tools.tolerance * tools.top;
@@ -114,25 +141,22 @@ pub(crate) fn chain(
         }
         let count = slice.eigenvalues.len();
         let used = count.div_ceil(WIDTH);
-        if used > blocks.len() {
-            return Err(Trouble::Again("more slices than foreseen".into()));
-        }
-        let (own, rest) = blocks.split_at_mut(used);
-        slice.vectors(tools, own)?;
-        blocks = rest;
+        blocks = blocks.split_at_mut(used).1;
+        found.residuals.extend(residuals);
         found.places.extend((0..count).map(|k| WIDTH * next_block + k));
         found.eigenvalues.extend(&slice.eigenvalues);
         next_block += used;
+        tools.progress.slice(count.min(left_over));
         below += count;
-        tools.progress.slice(count.min(left + right));
         if last {
             found.eigenvalues.truncate(end - first);
             found.places.truncate(end - first);
+            found.residuals.truncate(end - first);
             return Ok(found);
         }
         low = found.eigenvalues.last().copied().unwrap_or(low);
         ahead = slice.ahead();
-        if careful {
+        if attempt > 0 {
             drop(slice);
         } else {
             handover = Some(slice.hand_over(HAND_OVER * half)?);
@@ -170,7 +194,7 @@ fn place_shift(
     let (mut narrow, mut usable) = (false, 0);
     for _ in 0..60 {
         tools.progress.go_on()?;
-        let Some(factor) = symbolic.factor(shift, tools.progress) else {
+        let Some(factor) = symbolic.factor(tools.matrix, shift, tools.progress) else {
             shift += 0.013 * spacing;
             continue;
         };

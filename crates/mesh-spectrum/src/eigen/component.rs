@@ -6,11 +6,12 @@
 use faer::{Mat, Side};
 use rayon::prelude::*;
 
-use crate::eigen::assemble::{assemble, check_counts};
+use crate::eigen::assemble::{Joined, assemble, check_counts};
 use crate::eigen::block::{Block, Pool, Row, WIDTH};
 use crate::eigen::chain::{Found, Span, blocks_needed, chain, slices_expected};
-use crate::eigen::factor::{Factor, Symbolic, elimination_order, permuted};
+use crate::eigen::factor::{Factor, Symbolic};
 use crate::eigen::kernel::Kind;
+use crate::eigen::order::{elimination_order, permuted};
 use crate::eigen::slice::{Tools, Trouble, norm};
 use crate::eigen::weyl::Weyl;
 use crate::eigen::{EigenError, Progress};
@@ -56,6 +57,8 @@ pub(crate) struct Pairs {
     pub(crate) vectors: Block,
     /// Where each pair's vector is: 8 × block + column, ascending. Columns that belong to no pair hold anything finite.
     pub(crate) places: Vec<usize>,
+    /// ‖A v − λ v‖ of each vector as it is stored, 1/ℓ², if it has been measured.
+    pub(crate) residuals: Option<Vec<f64>>,
     /// Shifts, 1/ℓ², with the eigenvalues found below them and those counted by inertia.
     pub(crate) counts: Vec<(f64, usize, usize)>,
     pub(crate) dense: bool,
@@ -86,12 +89,12 @@ impl Component {
     }
 
     /// Puts the rows in elimination order and prepares the factorisation.
-    pub(crate) fn prepare(&mut self) -> Result<(), EigenError> {
+    pub(crate) fn prepare(&mut self, kind: Kind) -> Result<(), EigenError> {
         let order = elimination_order(&self.matrix)?;
         self.matrix = permuted(&self.matrix, &order);
         self.dofs = order.iter().map(|&row| self.dofs[row as usize]).collect();
         self.root_mass = order.iter().map(|&row| self.root_mass[row as usize]).collect();
-        self.symbolic = Some(Symbolic::new(&self.matrix)?);
+        self.symbolic = Some(Symbolic::new(&self.matrix, kind)?);
         Ok(())
     }
 
@@ -123,7 +126,7 @@ impl Component {
 
     /// Factors A − σI, both in `unit`.
     fn factor(&self, shift: f64, progress: &Progress) -> Option<Factor> {
-        self.symbolic.as_ref().expect("prepared").factor(shift, progress)
+        self.symbolic.as_ref().expect("prepared").factor(&self.matrix, shift, progress)
     }
 
     fn recycle(&self, factor: Factor) {
@@ -159,6 +162,7 @@ impl Component {
             eigenvalues: pairs.S().column_vector().iter().map(|e| e * self.unit).collect(),
             vectors,
             places: (0..n).collect(),
+            residuals: None,
             counts: Vec::new(),
             dense: true,
         })
@@ -177,7 +181,14 @@ impl Component {
         if count == 1 {
             progress.add(1);
             let (vectors, counts) = (Block::zeros(self.rows()), vec![(top, 1, 1)]);
-            return Ok(Pairs { eigenvalues: vec![0.0], vectors, places: vec![0], counts, dense: false });
+            return Ok(Pairs {
+                eigenvalues: vec![0.0],
+                vectors,
+                places: vec![0],
+                residuals: None,
+                counts,
+                dense: false,
+            });
         }
         let mut detail = String::new();
         for attempt in 0..4 {
@@ -185,6 +196,7 @@ impl Component {
             match self.attempt(top / self.unit, count, tolerance, (attempt as usize, seed), (kind, pool), progress) {
                 Ok(mut pairs) => {
                     pairs.eigenvalues.iter_mut().for_each(|e| *e *= self.unit);
+                    pairs.residuals.iter_mut().flatten().for_each(|residual| *residual *= self.unit);
                     pairs.counts.iter_mut().for_each(|(shift, ..)| *shift *= self.unit);
                     return Ok(pairs);
                 }
@@ -208,12 +220,13 @@ impl Component {
         let symbolic = self.symbolic.as_ref().expect("prepared");
         let weyl = Weyl::through(self.area * self.unit, top, count as f64);
         let spans = self.spans(weyl, top, count, (attempt, seed), progress)?;
-        let tools = Tools { matrix: &self.matrix, pool, kind, progress, top, tolerance };
+        let norm = self.norm / self.unit;
+        let tools = Tools { matrix: &self.matrix, pool, kind, progress, top, tolerance, norm };
 
-        progress.expect_slices(spans.iter().map(|span| slices_expected(span.end - span.first)).sum());
+        progress.expect_slices(spans.iter().map(|span| slices_expected(self.rows(), span.end - span.first)).sum());
 
         let n = self.rows();
-        let needed: Vec<usize> = spans.iter().map(|span| blocks_needed(span.end - span.first)).collect();
+        let needed: Vec<usize> = spans.iter().map(|span| blocks_needed(self.rows(), span.end - span.first)).collect();
         let mut vectors = Block::zeros(n * needed.iter().sum::<usize>());
         let mut blocks: Vec<&mut [Row]> = vectors.chunks_exact_mut(n).collect();
         let mut shares = Vec::new();
@@ -232,13 +245,13 @@ impl Component {
             .into_par_iter()
             .map(|(span, blocks)| chain(&tools, symbolic, weyl, span, blocks))
             .collect::<Result<_, Trouble>>()?;
-        let (eigenvalues, places) = assemble(&chains, &starts, top, tolerance)?;
+        let Joined { eigenvalues, places, residuals } = assemble(&chains, &starts, top, tolerance)?;
         let mut counts: Vec<(f64, usize)> = chains.iter().flat_map(|chain| chain.counts.iter().copied()).collect();
         counts.extend(spans.iter().skip(1).map(|span| (span.border, span.border_count)));
         counts.push((top, count));
         counts.sort_by(|a, b| a.0.total_cmp(&b.0));
         let counts = check_counts(&eigenvalues, &counts)?;
-        Ok(Pairs { eigenvalues, vectors, places, counts, dense: false })
+        Ok(Pairs { eigenvalues, vectors, places, residuals: Some(residuals), counts, dense: false })
     }
 
     /// Chains of about equal length. Where they meet is a value at which the eigenvalues below have been counted.

@@ -6,30 +6,26 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::Side;
+use faer::sparse::SymbolicSparseColMatRef;
 use faer::sparse::linalg::SupernodalThreshold;
-use faer::sparse::linalg::amd;
-use faer::sparse::linalg::cholesky::{self, SymbolicCholesky, SymbolicCholeskyRaw, supernodal};
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{Par, Side};
+use faer::sparse::linalg::cholesky::{self, SymbolicCholeskyRaw, supernodal::SymbolicSupernodalCholesky};
 
 use crate::eigen::block::{Block, WIDTH};
+use crate::eigen::front::{Tree, Workspace};
+use crate::eigen::kernel::{self, Kind};
 use crate::eigen::seconds::Step;
 use crate::eigen::solve::{Layout, Packed, Supernode};
 use crate::eigen::{EigenError, Progress};
 use crate::operator::Csr;
 
-/// The pattern of L, the same for every shift. `matrix` is already in elimination order.
+/// The pattern of L, the same for every shift, of a matrix that is already in elimination order.
 pub(crate) struct Symbolic {
-    start: Vec<usize>,
-    columns: Vec<usize>,
-    values: Vec<f64>,
-    /// Where each row's diagonal entry is.
-    diagonal: Vec<usize>,
-    cholesky: SymbolicCholesky<usize>,
+    tree: Tree,
     layout: Arc<Layout>,
-    /// Memory of factors that are no longer in use, the library's and ours: to touch new memory is dear.
-    unpacked: Mutex<Vec<Vec<f64>>>,
+    kind: Kind,
+    /// Memory of factorisations that are no longer in use: to touch new memory is dear.
+    workspaces: Mutex<Vec<Workspace>>,
     packed: Mutex<Vec<Packed>>,
 }
 
@@ -45,39 +41,43 @@ pub(crate) struct Factor {
     pub(crate) packed: Packed,
 }
 
+/// What is read off D and L while they are computed.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Pivots {
+    /// Negative entries of D.
+    pub(crate) negative: usize,
+    /// min |Dᵢ|; not a number if one of them is not.
+    pub(crate) least: f64,
+    /// max |Lᵢⱼ|.
+    pub(crate) growth: f64,
+}
+
 impl Symbolic {
     /// # Errors
     /// [`EigenError::OutOfMemory`] if the pattern of L cannot be held.
-    pub(crate) fn new(matrix: &Csr) -> Result<Symbolic, EigenError> {
+    pub(crate) fn new(matrix: &Csr, kind: Kind) -> Result<Symbolic, EigenError> {
         let n = matrix.rows();
-        let start = matrix.start.clone();
         let columns: Vec<usize> = matrix.columns.iter().map(|&column| column as usize).collect();
-        let diagonal =
-            (0..n).map(|row| start[row] + matrix.row(row).take_while(|&(column, _)| column < row).count()).collect();
-        let pattern = SymbolicSparseColMatRef::new_checked(n, n, &start, None, &columns);
+        let pattern = SymbolicSparseColMatRef::new_checked(n, n, &matrix.start, None, &columns);
         let parameters = cholesky::CholeskySymbolicParams {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
             ..Default::default()
         };
+        let out_of_memory = || EigenError::OutOfMemory { dofs: n };
         let cholesky = cholesky::factorize_symbolic_cholesky(
             pattern,
             Side::Upper,
             cholesky::SymmetricOrdering::Identity,
             parameters,
         )
-        .map_err(|_| EigenError::OutOfMemory { dofs: n })?;
-        let mut symbolic = Symbolic {
-            values: matrix.values.clone(),
-            start,
-            columns,
-            diagonal,
-            cholesky,
-            layout: Arc::new(Layout { supernodes: Vec::new(), rows: Vec::new(), len: 0 }),
-            unpacked: Mutex::default(),
-            packed: Mutex::default(),
+        .map_err(|_| out_of_memory())?;
+        let SymbolicCholeskyRaw::Supernodal(supernodes) = cholesky.raw() else {
+            unreachable!("the supernodal kind was asked for")
         };
-        symbolic.layout = Arc::new(layout(symbolic.supernodes()));
-        Ok(symbolic)
+        let layout = layout(supernodes);
+        let tree = Tree::new(matrix, &layout).ok_or_else(out_of_memory)?;
+        let (workspaces, packed) = (Mutex::default(), Mutex::default());
+        Ok(Symbolic { tree, layout: Arc::new(layout), kind, workspaces, packed })
     }
 
     /// Takes back the memory of a factor that is no longer needed.
@@ -85,64 +85,32 @@ impl Symbolic {
         lock(&self.packed).push(factor.packed);
     }
 
-    fn supernodes(&self) -> &supernodal::SymbolicSupernodalCholesky<usize> {
-        match self.cholesky.raw() {
-            SymbolicCholeskyRaw::Supernodal(supernodes) => supernodes,
-            SymbolicCholeskyRaw::Simplicial(_) => unreachable!("the supernodal kind was asked for"),
-        }
-    }
-
     /// Bytes of the pattern.
     pub(crate) fn bytes(&self) -> usize {
-        24 * self.values.len() + 24 * self.start.len() + 4 * self.supernodes().len_val()
+        self.tree.bytes() + 4 * self.layout.rows.len() + 64 * self.layout.supernodes.len()
     }
 
-    /// Bytes of a factor while it is repacked: the library's, ours (a quarter larger, as groups are filled up), and a
-    /// copy of the matrix.
+    /// Bytes of one factor and of what computing it takes.
     pub(crate) fn factor_bytes(&self) -> usize {
-        18 * self.supernodes().len_val() + 8 * self.values.len() + 32 * self.start.len()
+        64 * self.layout.len + 8 * self.tree.columns() + self.tree.workspace_bytes()
     }
 
-    /// Factors A − σI; `None` if a pivot is exactly zero or the result is not finite.
-    pub(crate) fn factor(&self, shift: f64, progress: &Progress) -> Option<Factor> {
-        progress.clock.time(Step::Factor, || self.numeric(shift))
-    }
-
-    fn numeric(&self, shift: f64) -> Option<Factor> {
-        let n = self.diagonal.len();
-        let mut values = self.values.clone();
-        for &place in &self.diagonal {
-            values[place] -= shift;
-        }
-        let supernodes = self.supernodes();
-        let pattern = SymbolicSparseColMatRef::new_checked(n, n, &self.start, None, &self.columns);
-        let mut l = lock(&self.unpacked).pop().unwrap_or_else(|| vec![0.0; supernodes.len_val()]);
-        let scratch = supernodal::factorize_supernodal_numeric_ldlt_scratch::<usize, f64>(
-            supernodes,
-            Par::Seq,
-            Default::default(),
-        );
-        let mut scratch = MemBuffer::try_new(scratch).ok()?;
-        let stack = MemStack::new(&mut scratch);
-        let matrix = SparseColMatRef::new(pattern, &values[..]);
-        supernodal::factorize_supernodal_numeric_ldlt(
-            &mut l,
-            matrix,
-            Default::default(),
-            supernodes,
-            Par::Seq,
-            stack,
-            Default::default(),
-        )
-        .ok()?;
-        let packed = lock(&self.packed).pop().unwrap_or_else(|| Packed {
-            layout: self.layout.clone(),
-            values: Block::zeros(self.layout.len),
-            inverse: vec![0.0; n],
-        });
-        let factor = pack(supernodes, &l, shift, packed);
-        lock(&self.unpacked).push(l);
-        (factor.growth.is_finite() && factor.pivot_min > 0.0).then_some(factor)
+    /// Factors A − σI, A being the matrix whose pattern this is; `None` if a pivot is exactly zero or the result is not
+    /// finite.
+    pub(crate) fn factor(&self, matrix: &Csr, shift: f64, progress: &Progress) -> Option<Factor> {
+        progress.clock.time(Step::Factor, || {
+            let mut packed = lock(&self.packed).pop().unwrap_or_else(|| Packed {
+                layout: self.layout.clone(),
+                values: Block::lasting(self.layout.len),
+                inverse: vec![0.0; self.tree.columns()],
+            });
+            let mut workspace = lock(&self.workspaces).pop().unwrap_or_else(|| self.tree.workspace());
+            let mut pivots = Pivots { negative: 0, least: f64::INFINITY, growth: 0.0 };
+            kernel::factor(self.kind, &self.tree, matrix, shift, &mut workspace, &mut packed, &mut pivots);
+            lock(&self.workspaces).push(workspace);
+            let Pivots { negative: below, least: pivot_min, growth } = pivots;
+            (growth.is_finite() && pivot_min > 0.0).then_some(Factor { shift, below, growth, pivot_min, packed })
+        })
     }
 }
 
@@ -150,8 +118,8 @@ fn lock<T>(list: &Mutex<T>) -> MutexGuard<'_, T> {
     list.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Where our solve wants the entries of the library's supernodes.
-fn layout(symbolic: &supernodal::SymbolicSupernodalCholesky<usize>) -> Layout {
+/// Where the entries of the supernodes go.
+fn layout(symbolic: &SymbolicSupernodalCholesky<usize>) -> Layout {
     let n = symbolic.nrows();
     let mut supernodes = Vec::with_capacity(symbolic.n_supernodes());
     let (mut len, mut rows) = (0, Vec::new());
@@ -160,9 +128,9 @@ fn layout(symbolic: &supernodal::SymbolicSupernodalCholesky<usize>) -> Layout {
         let width = symbolic.supernode_end()[number] - begin;
         let pattern = symbolic.supernode(number).pattern();
         let (blocks, groups) = (width.div_ceil(WIDTH), pattern.len().div_ceil(WIDTH));
-        let stride = width.next_multiple_of(4);
+        let stride = if width < 3 { width } else { width.next_multiple_of(4) };
         let diagonal = len;
-        let below = diagonal + WIDTH * (blocks * (blocks - 1) / 2) + width;
+        let below = if width == 1 { diagonal } else { diagonal + WIDTH * (blocks * (blocks - 1) / 2) + width };
         len = below + groups * stride;
         supernodes.push(Supernode { begin, width, stride, diagonal, below, rows: rows.len(), groups });
         rows.extend(pattern.iter().map(|&row| row as u32));
@@ -171,131 +139,11 @@ fn layout(symbolic: &supernodal::SymbolicSupernodalCholesky<usize>) -> Layout {
     Layout { supernodes, rows, len }
 }
 
-/// Repacks the library's supernodes (column-major, D on the diagonal) for the solve, and reads the inertia off D. What
-/// fills up groups is zero from the start and never written to.
-fn pack(symbolic: &supernodal::SymbolicSupernodalCholesky<usize>, l: &[f64], shift: f64, mut packed: Packed) -> Factor {
-    let layout = packed.layout.clone();
-    let (values, inverse) = (&mut packed.values[..], &mut packed.inverse);
-    let (mut below, mut growth, mut pivot_min) = (0, 0.0f64, f64::INFINITY);
-    for (number, s) in layout.supernodes.iter().enumerate() {
-        let height = s.width + symbolic.supernode(number).pattern().len();
-        let columns = &l[symbolic.col_ptr_for_val()[number]..][..s.width * height];
-        for (j, column) in columns.chunks_exact(height).enumerate() {
-            let pivot = column[j];
-            below += usize::from(pivot < 0.0);
-            pivot_min = if pivot.is_nan() { f64::NAN } else { pivot_min.min(pivot.abs()) };
-            inverse[s.begin + j] = 1.0 / pivot;
-            growth = column[j + 1..].iter().fold(
-                growth,
-                |most, x| {
-                    if x.is_nan() { f64::INFINITY } else { most.max(x.abs()) }
-                },
-            );
-            for (i, &entry) in column.iter().enumerate().take(s.width).skip(j + 1) {
-                let group = i / WIDTH;
-                values[s.diagonal + WIDTH * (group * (group + 1) / 2) + j][i % WIDTH] = entry;
-            }
-            for (i, &entry) in column[s.width..].iter().enumerate() {
-                values[s.below + i / WIDTH * s.stride + j][i % WIDTH] = entry;
-            }
-        }
-    }
-    Factor { shift, below, growth, pivot_min, packed }
-}
-
-/// An elimination order with little fill: approximate minimum degree, then a postorder of the elimination tree, so that
-/// columns of one supernode are neighbours. Result: position → row.
-pub(crate) fn elimination_order(matrix: &Csr) -> Result<Vec<u32>, EigenError> {
-    let n = matrix.rows();
-    let columns: Vec<usize> = matrix.columns.iter().map(|&column| column as usize).collect();
-    let pattern = SymbolicSparseColMatRef::new_checked(n, n, &matrix.start, None, &columns);
-    let (mut order, mut inverse) = (vec![0; n], vec![0; n]);
-    let out_of_memory = || EigenError::OutOfMemory { dofs: n };
-    let mut scratch = MemBuffer::try_new(amd::order_scratch::<usize>(n, columns.len())).map_err(|_| out_of_memory())?;
-    amd::order(&mut order, &mut inverse, pattern, amd::Control::default(), MemStack::new(&mut scratch))
-        .map_err(|_| out_of_memory())?;
-    let order: Vec<u32> = order.iter().map(|&row| row as u32).collect();
-    let parents = elimination_tree(&permuted(matrix, &order));
-    Ok(postorder(&parents).iter().map(|&position| order[position as usize]).collect())
-}
-
-/// B[i, j] = A[order[i], order[j]].
-pub(crate) fn permuted(matrix: &Csr, order: &[u32]) -> Csr {
-    let mut position = vec![0; order.len()];
-    for (new, &old) in order.iter().enumerate() {
-        position[old as usize] = new as u32;
-    }
-    let mut result = Csr {
-        start: vec![0],
-        columns: Vec::with_capacity(matrix.columns.len()),
-        values: Vec::with_capacity(matrix.values.len()),
-    };
-    for &old in order {
-        let mut row: Vec<(u32, f64)> =
-            matrix.row(old as usize).map(|(column, value)| (position[column], value)).collect();
-        row.sort_unstable_by_key(|entry| entry.0);
-        result.columns.extend(row.iter().map(|entry| entry.0));
-        result.values.extend(row.iter().map(|entry| entry.1));
-        result.start.push(result.columns.len());
-    }
-    result
-}
-
-const NONE: u32 = u32::MAX;
-
-/// Parent of every column in the elimination tree (Liu 1986, with path compression).
-fn elimination_tree(matrix: &Csr) -> Vec<u32> {
-    let n = matrix.rows();
-    let (mut parent, mut ancestor) = (vec![NONE; n], vec![NONE; n]);
-    for k in 0..n {
-        for (mut i, _) in matrix.row(k).take_while(|&(column, _)| column < k) {
-            while i < k {
-                let next = std::mem::replace(&mut ancestor[i], k as u32);
-                if next == NONE {
-                    parent[i] = k as u32;
-                    break;
-                }
-                i = next as usize;
-            }
-        }
-    }
-    parent
-}
-
-/// Children before parents, the largest subtree last, next to its parent.
-fn postorder(parent: &[u32]) -> Vec<u32> {
-    let n = parent.len();
-    let mut size = vec![1u32; n];
-    let mut children = vec![Vec::new(); n];
-    let mut stack = Vec::new();
-    for i in 0..n {
-        match parent[i] {
-            NONE => stack.push((i as u32, false)),
-            p => {
-                size[p as usize] += size[i]; // parents come after their children
-                children[p as usize].push(i as u32);
-            }
-        }
-    }
-    let mut order = Vec::with_capacity(n);
-    while let Some((node, visited)) = stack.pop() {
-        if visited {
-            order.push(node);
-            continue;
-        }
-        stack.push((node, true));
-        let mut below = std::mem::take(&mut children[node as usize]);
-        below.sort_by_key(|&child| std::cmp::Reverse(size[child as usize]));
-        stack.extend(below.into_iter().map(|child| (child, false)));
-    }
-    order
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::eigen::block::{Row, ZERO};
-    use crate::eigen::kernel::{self, Kind};
+    use crate::eigen::order::{elimination_order, permuted};
 
     /// 2 + a diagonal, −1 to the four neighbours on a grid.
     fn grid(side: usize) -> Csr {
@@ -320,10 +168,10 @@ mod tests {
             let n = matrix.rows();
             let dense = faer::Mat::from_fn(n, n, |i, j| matrix.row(i).find(|e| e.0 == j).map_or(0.0, |e| e.1));
             let eigenvalues = dense.self_adjoint_eigenvalues(Side::Lower).unwrap();
-            let symbolic = Symbolic::new(&matrix).unwrap();
+            let symbolic = Symbolic::new(&matrix, Kind::best()).unwrap();
             for k in [0, n / 3, n - 1] {
                 let shift = if k == 0 { eigenvalues[0] - 0.1 } else { 0.5 * (eigenvalues[k - 1] + eigenvalues[k]) };
-                let factor = symbolic.factor(shift, &Progress::new(&(), 0)).unwrap();
+                let factor = symbolic.factor(&matrix, shift, &Progress::new(&(), 0)).unwrap();
                 assert_eq!(factor.below, k);
                 let x: Vec<Row> = (0..=n)
                     .map(|i| std::array::from_fn(|c| if i < n { ((i * 31 + c * 7) % 17) as f64 - 8.0 } else { 0.0 }))

@@ -1,14 +1,18 @@
 //! The last step of every component: the exact null vector, orthogonality across slices, and the measured evidence.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
-use crate::eigen::block::{Row, SMALL_ZERO, Small, WIDTH, ZERO};
+use crate::eigen::block::{Row, SMALL_ZERO, Small, WIDTH, ZERO, transpose};
 use crate::eigen::component::{Component, Pairs};
 use crate::eigen::kernel::{self, Kind};
 use crate::eigen::{EigenError, Orthogonality, Progress};
 
-/// Inner products above this are removed. Slices leave 1e-12 (inside) to 2e-10 (across a border).
-const CLEAN_ABOVE: f64 = 1e-11;
+/// Inner products above this share of what is allowed are removed, once one is above `CLEAN_FROM` of it. Slices leave
+/// 1e-12 (inside) to 2e-10 (across a border).
+const CLEAN_ABOVE: f64 = 0.5;
+const CLEAN_FROM: f64 = 0.9;
 
 /// Inner products above this are no rounding: the same eigenspace was taken twice. Below it the vectors span what they
 /// should, even where slivers make rounding large, and residuals measured afterwards decide whether they are eigenvectors.
@@ -70,43 +74,104 @@ pub(crate) fn finish(
     if loss.is_nan() || loss > OVERLAP_MAX {
         return Err(EigenError::NotOrthogonal { loss });
     }
+    let allowed = orthogonality.allowed();
     let (above, enough) = match orthogonality {
-        Orthogonality::Standard => (CLEAN_ABOVE, 5.0 * CLEAN_ABOVE),
+        Orthogonality::Standard => (CLEAN_ABOVE * allowed, CLEAN_FROM * allowed),
         Orthogonality::Full => (0.0, 0.0),
     };
+    let mut cleaned = false;
     for pass in 0..4 {
         // Slivers may need several passes. Full orthogonality is one at least, and more only where it is not yet there.
-        if loss <= if pass == 0 { enough } else { enough.max(0.1 * orthogonality.allowed()) } {
+        if loss <= if pass == 0 { enough } else { enough.max(0.1 * allowed) } {
             break;
         }
-        gram.clean(&mut blocks, &places, above, kind, progress)?;
-        gram = Gram::of(&blocks, kind, progress)?;
+        let changed = gram.clean(&mut blocks, &places, above, kind, progress)?;
+        cleaned = true;
+        gram.renew(&changed, &blocks, kind, progress)?;
         loss = gram.loss(&places);
     }
     let scales: Vec<f64> = places.iter().map(|&place| 1.0 / gram.entry(place, place).sqrt()).collect();
 
-    let mut per_block: Vec<(Row, Row)> = vec![(ZERO, ZERO); blocks.len()];
-    for ((&place, eigenvalue), scale) in places.iter().zip(&pairs.eigenvalues).zip(&scales) {
-        let (eigenvalues, block_scales) = &mut per_block[place / WIDTH];
-        eigenvalues[place % WIDTH] = eigenvalue / component.unit;
-        block_scales[place % WIDTH] = *scale;
+    // What was measured before holds where nothing has been changed since: not in the first block, with the null vector.
+    let known = pairs.residuals.as_ref().filter(|_| !cleaned);
+    let mut per_block = vec![Measured { known: 0.0, eigenvalues: ZERO, scales: ZERO }; blocks.len()];
+    for (k, (&place, scale)) in places.iter().zip(&scales).enumerate() {
+        let block = &mut per_block[place / WIDTH];
+        block.eigenvalues[place % WIDTH] = pairs.eigenvalues[k] / component.unit;
+        block.scales[place % WIDTH] = *scale;
+        block.known = larger(known.map_or(0.0, |known| known[k] * scale), block.known);
     }
     let residual = blocks
         .par_iter()
         .zip(&per_block)
-        .map(|(block, (eigenvalues, scales))| {
+        .enumerate()
+        .map(|(number, (block, Measured { known: most, eigenvalues, scales }))| {
+            if number > 0 && known.is_some() {
+                return Ok(*most);
+            }
             progress.go_on()?;
             let mut squares = ZERO;
             kernel::residual(kind, &component.matrix, block, eigenvalues, &mut squares);
-            Ok((0..WIDTH).map(|k| squares[k].sqrt() * scales[k]).fold(0.0, larger))
+            Ok(component.unit * (0..WIDTH).map(|k| squares[k].sqrt() * scales[k]).fold(0.0, larger))
         })
         .try_reduce(|| 0.0, |a, b| Ok(larger(a, b)))?; // a maximum, the same in any order
-    Ok(Evidence { residual: residual * component.unit, orthogonality: loss, scales })
+    Ok(Evidence { residual, orthogonality: loss, scales })
+}
+
+/// What is known of the columns of a block, which need not all belong to a pair.
+#[derive(Clone)]
+struct Measured {
+    /// The largest residual, 1/ℓ², if that has been measured.
+    known: f64,
+    eigenvalues: Row,
+    scales: Row,
 }
 
 /// The larger of two numbers; not a number, if one is not.
 fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || a > b { a } else { b }
+}
+
+/// For each of `columns`, Q_kᵀ W_i of the blocks i in the range that `of` says, and of all blocks k before the end it
+/// says. Summed in parts that do not depend on the number of threads.
+fn products(
+    blocks: &[&mut [Row]],
+    columns: &[usize],
+    of: impl Fn(usize) -> (Range<usize>, usize) + Sync,
+    kind: Kind,
+    progress: &Progress,
+) -> Result<Vec<Vec<Small>>, EigenError> {
+    let n = blocks[0].len();
+    let part = n.div_ceil(PARTS).next_multiple_of(PANEL);
+    let zero = || -> Vec<Vec<Small>> {
+        let size = |&i: &usize| of(i).0.len() * of(i).1;
+        columns.iter().map(|i| vec![SMALL_ZERO; size(i)]).collect()
+    };
+    let one = |first: usize| {
+        let mut sums = zero();
+        let mut out = Vec::new();
+        for first in (first..(first + part).min(n)).step_by(PANEL) {
+            progress.go_on()?;
+            let panel: Vec<&[Row]> = blocks.iter().map(|block| &block[first..(first + PANEL).min(n)]).collect();
+            for (&i, sum) in columns.iter().zip(&mut sums) {
+                let (own, end) = of(i);
+                out.resize(sum.len(), SMALL_ZERO);
+                kernel::gram(kind, &panel[..end], &panel[own], &mut out);
+                add(sum, &out);
+            }
+        }
+        Ok(sums)
+    };
+    let parts = (0..n).into_par_iter().step_by(part).map(one).collect::<Result<Vec<_>, EigenError>>()?;
+    let mut sums = zero();
+    parts.iter().for_each(|part| sums.iter_mut().zip(part).for_each(|(sum, part)| add(sum, part)));
+    Ok(sums)
+}
+
+fn add(sums: &mut [Small], parts: &[Small]) {
+    for (sum, part) in sums.as_flattened_mut().iter_mut().zip(parts.as_flattened()) {
+        (0..WIDTH).for_each(|k| sum[k] += part[k]);
+    }
 }
 
 /// Vᵀ V, the blocks (k, i) with k ≤ i, one i after another.
@@ -117,38 +182,36 @@ struct Gram {
 
 impl Gram {
     fn of(blocks: &[&mut [Row]], kind: Kind, progress: &Progress) -> Result<Gram, EigenError> {
-        let n = blocks[0].len();
-        let part = n.div_ceil(PARTS).next_multiple_of(PANEL);
         let count = blocks.len();
-        let size = count * (count + 1) / 2;
-        let one = |first: usize| {
-            let mut sum = vec![SMALL_ZERO; size];
-            let mut out = vec![SMALL_ZERO; 2 * count];
-            for first in (first..(first + part).min(n)).step_by(PANEL) {
-                progress.go_on()?;
-                let panel: Vec<&[Row]> = blocks.iter().map(|block| &block[first..(first + PANEL).min(n)]).collect();
-                for i in (0..count).step_by(2) {
-                    let end = (i + 2).min(count);
-                    let out = &mut out[..(end - i) * end];
-                    kernel::gram(kind, &panel[..end], &panel[i..end], out);
-                    for (i, out) in (i..end).zip(out.chunks_exact(end)) {
-                        let sum = &mut sum[i * (i + 1) / 2..][..i + 1];
-                        for (sum, out) in sum.as_flattened_mut().iter_mut().zip(out.as_flattened()) {
-                            (0..WIDTH).for_each(|k| sum[k] += out[k]);
-                        }
-                    }
-                }
-            }
-            Ok(sum)
-        };
-        let sums = (0..n).into_par_iter().step_by(part).map(one).collect::<Result<Vec<_>, _>>()?;
-        let mut parts = vec![SMALL_ZERO; size];
-        for sum in sums {
-            for (total, sum) in parts.as_flattened_mut().iter_mut().zip(sum.as_flattened()) {
-                (0..WIDTH).for_each(|k| total[k] += sum[k]);
+        let starts: Vec<usize> = (0..count).step_by(2).collect();
+        let mut parts = vec![SMALL_ZERO; count * (count + 1) / 2];
+        // Two columns of blocks at a time, down to the diagonal.
+        let pair = |i: usize| (i..(i + 2).min(count), (i + 2).min(count));
+        for (i, of_pair) in starts.iter().zip(products(blocks, &starts, pair, kind, progress)?) {
+            let (columns, end) = pair(*i);
+            for (i, out) in columns.zip(of_pair.chunks_exact(end)) {
+                parts[i * (i + 1) / 2..][..i + 1].copy_from_slice(&out[..i + 1]);
             }
         }
         Ok(Gram { blocks: count, parts })
+    }
+
+    /// Measures anew what has changed with some of the blocks.
+    fn renew(
+        &mut self,
+        changed: &[usize],
+        blocks: &[&mut [Row]],
+        kind: Kind,
+        progress: &Progress,
+    ) -> Result<(), EigenError> {
+        let count = self.blocks;
+        for (&i, out) in changed.iter().zip(products(blocks, changed, |i| (i..i + 1, count), kind, progress)?) {
+            for (k, out) in out.iter().enumerate() {
+                let (low, high) = (k.min(i), k.max(i));
+                self.parts[high * (high + 1) / 2 + low] = if k <= i { *out } else { transpose(out) };
+            }
+        }
+        Ok(())
     }
 
     /// The entry of two columns.
@@ -172,7 +235,7 @@ impl Gram {
 
     /// V ← V (3 I − Vᵀ V) / 2 on vectors scaled to length 1, the first step of Löwdin's symmetric orthonormalisation,
     /// for the entries above a bound. What is left is of the square of what was there. The null vector, the first,
-    /// stays as it is.
+    /// stays as it is. Result: the blocks that have changed.
     fn clean(
         &self,
         blocks: &mut [&mut [Row]],
@@ -180,7 +243,7 @@ impl Gram {
         above: f64,
         kind: Kind,
         progress: &Progress,
-    ) -> Result<(), EigenError> {
+    ) -> Result<Vec<usize>, EigenError> {
         // V ← V + V C. Columns that belong to no pair are left alone.
         let count = self.blocks;
         let mut c = vec![SMALL_ZERO; count * count];
@@ -223,6 +286,7 @@ impl Gram {
                 kernel::update(kind, &from, &c, &mut [rows], true);
             }
             Ok(())
-        })
+        })?;
+        Ok((0..count).filter(|&i| !partners[i].is_empty()).collect())
     }
 }

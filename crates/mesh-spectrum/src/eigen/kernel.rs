@@ -6,7 +6,9 @@
 //! Tall blocks do not fit in any cache, so every product reads each of them once, panel by panel, for as many columns
 //! as the registers hold; the lines that come next are asked for ahead of time.
 
-use crate::eigen::block::{Row, SMALL_ZERO, Small, WIDTH, ZERO};
+use crate::eigen::block::{Row, SMALL_ZERO, Small, WIDTH, ZERO, transpose};
+use crate::eigen::factor::Pivots;
+use crate::eigen::front::{Tree, Workspace, factor_with};
 use crate::eigen::solve::{Packed, solve_with};
 use crate::operator::Csr;
 
@@ -96,8 +98,8 @@ pub(crate) fn prefetch(rows: &[Row], row: usize) {
     let _ = (rows, row);
 }
 
-/// Rows that are walked together, so that a panel of each block in use stays in the caches (8 KiB each).
-const PANEL: usize = 128;
+/// Rows that are walked together, so that a panel of each block in use stays in the caches (16 KiB each).
+const PANEL: usize = 256;
 
 /// How far ahead of its use a block's row is asked for.
 const AHEAD: usize = 64;
@@ -205,7 +207,7 @@ fn update_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>
     add: bool,
 ) {
     let rows = blocks.first().map_or(0, |block| block.len());
-    let panel = PANEL / 2; // a multiple of R
+    let panel = PANEL / 4; // a multiple of R
     for first in (0..rows).step_by(panel) {
         let end = (first + panel).min(rows);
         let mut c = c.chunks_exact(blocks.len());
@@ -234,23 +236,31 @@ fn update_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>
     }
 }
 
-/// W += Q C, then out = Pᵀ W, or Wᵀ W if no P is given, in one pass.
+/// W += Σ_k Q_k C_k, then out_i = P_iᵀ W, or Wᵀ W if no P is given, in one pass.
 #[inline(always)]
 fn recur_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>(
-    q: &[Row],
-    c: &Small,
+    q: &[&[Row]],
+    c: &[Small],
     w: &mut [Row],
-    p: Option<&[Row]>,
-    out: &mut Small,
+    p: &[&[Row]],
+    out: &mut [Small],
 ) {
-    *out = SMALL_ZERO;
-    for first in (0..q.len()).step_by(PANEL) {
-        let panel = first..(first + PANEL).min(q.len());
-        let w = &mut w[panel.clone()];
-        update_with::<A, R, HIGH, 1>(&[&q[panel.clone()]], std::slice::from_ref(c), &mut [w], true);
-        let [part] = outer::<A, HIGH, 1>(p.map_or(&*w, |p| &p[panel]), [&*w]);
-        self::add(out, &part);
+    out.fill(SMALL_ZERO);
+    let mut part = vec![SMALL_ZERO; out.len()];
+    let (mut q_panels, mut p_panels) = (Vec::with_capacity(q.len()), Vec::with_capacity(p.len()));
+    for (number, w) in w.chunks_mut(PANEL).enumerate() {
+        let panel = PANEL * number..PANEL * number + w.len();
+        q_panels.clear();
+        q_panels.extend(q.iter().map(|q| &q[panel.clone()]));
+        update_with::<A, R, HIGH, P>(&q_panels, c, &mut [w], true);
+        p_panels.clear();
+        p_panels.extend(p.iter().map(|p| &p[panel.clone()]));
+        // Wᵀ P_i two at a time, and turned at the end: W stays in the first cache.
+        let ws = if p.is_empty() { &[&*w] } else { &p_panels[..] };
+        gram_with::<A, R, HIGH, P>(&[&*w], ws, &mut part);
+        out.iter_mut().zip(&part).for_each(|(out, part)| add(out, part));
     }
+    out.iter_mut().for_each(|out| *out = transpose(out));
 }
 
 /// W = W C in place.
@@ -345,14 +355,18 @@ dispatched! {
     gram = gram_with(blocks: &[&[Row]], ws: &[&[Row]], out: &mut [Small]);
     /// W_i (+)= Σ_k Q_k C_ki with C_ki = c[i·blocks + k], the layout of `gram`.
     update = update_with(blocks: &[&[Row]], c: &[Small], ws: &mut [&mut [Row]], add: bool);
-    /// W += Q C, then out = Pᵀ W, or Wᵀ W if no P is given, in one pass.
-    recur = recur_with(q: &[Row], c: &Small, w: &mut [Row], p: Option<&[Row]>, out: &mut Small);
+    /// W += Σ_k Q_k C_k, then out_i = P_iᵀ W, or Wᵀ W if no P is given, in one pass.
+    recur = recur_with(q: &[&[Row]], c: &[Small], w: &mut [Row], p: &[&[Row]], out: &mut [Small]);
     /// W = W C in place.
     scale = scale_with(c: &Small, w: &mut [Row]);
     /// Y = a·A X + b·X + c·Y for a sparse symmetric A.
     sparse = sparse_with(matrix: &Csr, x: &[Row], y: &mut [Row], abc: [f64; 3]);
     /// `squares[k]` = ‖A x_k − λ_k x_k‖² for the eight columns of X.
     residual = residual_with(matrix: &Csr, x: &[Row], eigenvalues: &Row, squares: &mut Row);
+    /// L D Lᵀ = A − σI.
+    factor = factor_with(
+        tree: &Tree, matrix: &Csr, shift: f64, workspace: &mut Workspace, packed: &mut Packed, pivots: &mut Pivots
+    );
     /// X = (L D Lᵀ)⁻¹ X; `x` has one row more than the matrix.
     solve = solve_with(factor: &Packed, x: &mut [Row]);
 }
@@ -394,11 +408,13 @@ pub(crate) mod tests {
         seen.extend(ws.concat());
         update(kind, &blocks, &smalls(6, 1), &mut ws.each_mut().map(|w| &mut w[..]), false);
         seen.extend(ws.concat());
-        let (mut w, mut out) = (w, SMALL_ZERO);
-        recur(kind, &q, &smalls(1, 2)[0], &mut w, Some(&p), &mut out);
-        seen.extend(out);
-        recur(kind, &q, &smalls(1, 7)[0], &mut w, None, &mut out);
-        seen.extend(out);
+        let (mut w, mut out) = (w, [SMALL_ZERO; 3]);
+        recur(kind, &blocks, &smalls(2, 2), &mut w, &[&p, &v, &q], &mut out);
+        let direct: f64 = v.iter().zip(&w).map(|(v, w)| v[2] * w[6]).sum();
+        assert!((out[1][2][6] - direct).abs() <= 1e-15 * rows as f64, "rounding of sums of products below 1");
+        seen.extend(out.concat());
+        recur(kind, &blocks[..1], &smalls(1, 7), &mut w, &[], &mut out[..1]);
+        seen.extend(out[0]);
         scale(kind, &smalls(1, 3)[0], &mut w);
         seen.extend(w);
         seen

@@ -12,6 +12,12 @@
 //!
 //! so that after one solve, Op₂ Q = X C_x + Q C_q + Q₂ R, the projection of Op₂ on X, Q, Q₂ is known exactly and the
 //! recurrence goes on from there.
+//!
+//! Orthogonality is lost along the eigenvectors next to the shift: there a solve loses most digits, and there Op
+//! multiplies most what has been lost. So every block is made orthogonal to the few Ritz vectors nearest to the shift,
+//! which are read anyway or cost little, and the whole basis is gone through only every third or fourth block.
+
+use std::ops::Range;
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -25,11 +31,21 @@ use crate::eigen::projected::{Projected, Ritz};
 use crate::eigen::seconds::Step;
 use crate::eigen::slice::Tools;
 
-/// The loss of orthogonality at which a basis is repaired. What is lost by then goes into the vectors' residuals.
+/// The loss of orthogonality that a basis is repaired before. What is lost by then goes into the vectors' residuals.
 const LOSS_MAX: f64 = 1e-9;
 
 /// A measured loss above this says that the estimate cannot be trusted: from there on every block is orthogonalised.
-const LOSS_TRUSTED: f64 = 1e-8;
+const LOSS_TRUSTED: f64 = 1e-7;
+
+/// Blocks of Ritz vectors nearest to the shift that every step is made orthogonal to.
+const NEAREST: usize = 2;
+
+/// The dimension at which the nearest Ritz vectors of a space that started with random vectors are good to a digit or
+/// two, and that at which they are better.
+const NEAREST_AT: [usize; 2] = [96, 192];
+
+/// What is left of a block beside what was taken away, if one pass of Gram-Schmidt is to be enough.
+const ONE_PASS: f64 = 1e-3;
 
 /// Rows that are combined between two questions whether to stop.
 const ROWS_AT_ONCE: usize = 1 << 15;
@@ -53,6 +69,11 @@ pub(crate) struct Krylov<'a> {
     coupling: Small,
     loss: Loss,
     every_step: bool,
+    /// Blocks of X nearest to the shift.
+    nearest_kept: Range<usize>,
+    /// The same, where there is no X: Ritz vectors of this space, and how often they have been formed.
+    nearest: Vec<Block>,
+    nearest_formed: usize,
     random: ChaCha8Rng,
     /// The largest |α| so far: an estimate of ‖Op‖ from below.
     scale: f64,
@@ -71,6 +92,7 @@ pub(crate) struct Handover {
     theta: Vec<f64>,
     s: Vec<[f64; WIDTH]>,
     shift: f64,
+    loss: Loss,
 }
 
 impl<'a> Krylov<'a> {
@@ -97,10 +119,13 @@ impl<'a> Krylov<'a> {
             coupling: SMALL_ZERO,
             loss: Loss::default(),
             every_step: careful,
+            nearest_kept: 0..0,
+            nearest: Vec::new(),
+            nearest_formed: 0,
             random: ChaCha8Rng::seed_from_u64(seed),
             scale: 0.0,
         };
-        if let Some(Handover { x, q, theta, s, shift }) = handover {
+        if let Some(Handover { x, q, theta, s, shift, loss }) = handover {
             space.moved = factor.shift - shift;
             space.start = theta
                 .iter()
@@ -110,6 +135,11 @@ impl<'a> Krylov<'a> {
                     Start { value, g: s.map(|s| s / theta * value) }
                 })
                 .collect();
+            let distance = |k: &usize| 1.0 / space.start[*k].value.abs();
+            let closest = (0..kept).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0) / WIDTH;
+            let first = closest.saturating_sub(NEAREST / 2);
+            space.nearest_kept = first..(first + NEAREST).min(kept / WIDTH);
+            space.loss = loss.next(WIDTH * space.nearest_kept.start..WIDTH * space.nearest_kept.end);
             space.basis = x;
             space.basis.push(q);
         } else {
@@ -119,7 +149,7 @@ impl<'a> Krylov<'a> {
             space.orthonormalise(&mut start, square);
             space.basis.push(start);
         }
-        space.loss.repaired(kept, &mut space.random);
+        space.loss.repaired(kept, 1.0, &mut space.random);
         space
     }
 
@@ -134,42 +164,60 @@ impl<'a> Krylov<'a> {
     }
 
     /// Grows the space by one block.
-    pub(crate) fn step(&mut self) {
+    ///
+    /// # Errors
+    /// [`EigenError::Stopped`].
+    pub(crate) fn step(&mut self) -> Result<(), EigenError> {
         let (n, kind, last) = (self.n, self.tools.kind, self.basis.len() - 1);
         let clock = &self.tools.progress.clock;
         let mut w = self.tools.pool.take(n + 1);
         w.copy_from_slice(&self.basis[last]);
         clock.time(Step::Solve, || kernel::solve(kind, &self.factor.packed, &mut w));
-        clock.time(Step::Orthogonalise, || self.recur(w));
+        let repaired = clock.time(Step::Orthogonalise, || self.recur(w));
+        if repaired { self.form_nearest() } else { Ok(()) }
     }
 
-    /// Orthogonalises Op Q_j and takes it into the basis.
-    fn recur(&mut self, mut w: Block) {
+    /// Orthogonalises Op Q_j and takes it into the basis. Result: whether the whole basis was repaired.
+    fn recur(&mut self, mut w: Block) -> bool {
         let (n, kind, last) = (self.n, self.tools.kind, self.basis.len() - 1);
         // X is coupled to the first two blocks. Later the three-term recurrence removes all but rounding.
         let coupled = self.kept > 0 && self.steps < 2;
-        let mut alpha = SMALL_ZERO;
-        let mut square = SMALL_ZERO;
+        let (mut alpha, mut square);
         let mut along = Vec::new();
+        // Rounding of the projection beside that of an inner product.
+        let mut rounding = 1.0;
         if coupled {
             along = self.orthogonalise(&mut w);
-            self.orthogonalise(&mut w).iter().zip(&mut along).for_each(|(again, along)| add(along, again));
+            square = gram_of(kind, &w[..n], &w[..n]);
+            let taken = largest(&along);
+            let left = (0..WIDTH).map(|a| square[a][a].sqrt()).fold(f64::INFINITY, f64::min);
+            rounding = (taken / left).max(1.0);
+            if self.every_step || left.is_nan() || left < ONE_PASS * taken {
+                self.orthogonalise(&mut w).iter().zip(&mut along).for_each(|(again, along)| add(along, again));
+                square = gram_of(kind, &w[..n], &w[..n]);
+                rounding = 1.0;
+            }
             alpha = along[last];
         } else {
+            let mut q = vec![&self.basis[last][..n]];
+            if !self.every_step {
+                q.extend(self.basis[self.nearest_kept.clone()].iter().chain(&self.nearest).map(|block| &block[..n]));
+            }
+            let mut c = vec![SMALL_ZERO; q.len()];
             if self.steps > 0 {
                 let back = negative(&transpose(&self.coupling));
-                let (before, q) = (&self.basis[last - 1][..n], &self.basis[last][..n]);
-                kernel::recur(kind, before, &back, &mut w[..n], Some(q), &mut alpha);
+                kernel::recur(kind, &[&self.basis[last - 1][..n]], &[back], &mut w[..n], &q, &mut c);
             } else {
-                alpha = gram_of(kind, &self.basis[last][..n], &w[..n]);
+                kernel::gram(kind, &q, &[&w[..n]], &mut c);
             }
-            kernel::recur(kind, &self.basis[last][..n], &negative(&alpha), &mut w[..n], None, &mut square);
+            alpha = c[0];
+            let minus: Vec<Small> = c.iter().map(negative).collect();
+            square = SMALL_ZERO;
+            kernel::recur(kind, &q, &minus, &mut w[..n], &[], std::slice::from_mut(&mut square));
             if self.every_step {
                 add(&mut alpha, &self.orthogonalise(&mut w)[last]);
+                square = gram_of(kind, &w[..n], &w[..n]);
             }
-        }
-        if coupled || self.every_step {
-            square = gram_of(kind, &w[..n], &w[..n]);
         }
         self.loss.measure(&alpha);
         let turned = transpose(&alpha);
@@ -184,14 +232,40 @@ impl<'a> Krylov<'a> {
 
         let before = std::mem::replace(&mut self.coupling, r);
         let columns = WIDTH * self.basis.len();
+        let mut repaired = false;
         if coupled || self.every_step {
-            self.loss.repaired(columns, &mut self.random);
+            self.loss.repaired(columns, rounding, &mut self.random);
         } else if self.loss.step(&self.projected, &alpha, &before, &r, &mut self.random) > LOSS_MAX {
-            self.repair(&mut w);
-            self.loss.repaired(columns, &mut self.random);
+            let measured = self.repair(&mut w);
+            self.every_step |= measured > LOSS_TRUSTED;
+            self.loss.compare(measured);
+            self.loss.repaired(columns, 1.0, &mut self.random);
+            repaired = true;
         }
         self.basis.push(w);
         self.steps += 1;
+        repaired
+    }
+
+    /// Forms the Ritz vectors nearest to the shift, if there is no X to take them from and they are worth it by now.
+    fn form_nearest(&mut self) -> Result<(), EigenError> {
+        let due = NEAREST_AT.get(self.nearest_formed).is_some_and(|&at| self.dimension() >= at);
+        if self.kept > 0 || self.every_step || !due {
+            return Ok(());
+        }
+        let Some(ritz) = self.ritz() else { return Ok(()) };
+        self.nearest_formed = NEAREST_AT.iter().filter(|&&at| self.dimension() >= at).count();
+        let mut order: Vec<usize> = (0..ritz.values.len()).collect();
+        order.sort_by(|&a, &b| ritz.values[b].abs().total_cmp(&ritz.values[a].abs()));
+        let chosen = &order[..WIDTH * NEAREST];
+        let mut nearest = std::mem::take(&mut self.nearest);
+        nearest.resize_with(NEAREST, || self.tools.pool.take(self.n + 1));
+        let mut into: Vec<&mut [Row]> = nearest.iter_mut().map(|x| &mut x[..self.n]).collect();
+        let combined = self.combine(&ritz, chosen, false, &mut into);
+        self.nearest = nearest;
+        let column = |&k: &usize| (0..ritz.values.len()).map(|i| ritz.vectors[(i, k)]).collect();
+        self.loss.deflate(chosen.iter().map(column).collect());
+        combined
     }
 
     /// Notes what a step has found in the projected operator.
@@ -233,20 +307,20 @@ impl<'a> Krylov<'a> {
         c
     }
 
-    /// Makes the last block and the new one orthogonal to all before them:
-    /// both, because the recurrence goes on from both, and together, because the basis is then read once.
-    fn repair(&mut self, w: &mut [Row]) {
+    /// Makes the last block and the new one orthogonal to all before them: both, because the recurrence goes on from
+    /// both, and together, because the basis is then read once. Result: the largest inner product there was.
+    fn repair(&mut self, w: &mut [Row]) -> f64 {
         let (n, kind) = (self.n, self.tools.kind);
-        let Some((last, earlier)) = self.basis.split_last_mut() else { return };
+        let Some((last, earlier)) = self.basis.split_last_mut() else { return 0.0 };
         let blocks: Vec<&[Row]> = earlier.iter().map(|block| &block[..n]).collect();
         let mut c = vec![SMALL_ZERO; 2 * blocks.len()];
         kernel::gram(kind, &blocks, &[&last[..n], &w[..n]], &mut c);
-        let measured = c.as_flattened().as_flattened().iter().fold(0.0f64, |most, c| most.max(c.abs()));
-        self.every_step |= measured > LOSS_TRUSTED;
+        let measured = largest(&c);
         let minus: Vec<Small> = c.iter().map(negative).collect();
         kernel::update(kind, &blocks, &minus, &mut [&mut last[..n], &mut w[..n]], true);
         let between = negative(&gram_of(kind, &last[..n], &w[..n]));
         kernel::update(kind, &[&last[..n]], &[between], &mut [&mut w[..n]], true);
+        measured
     }
 
     /// W = Q R with R upper triangular; W becomes Q. `square` is Wᵀ W. Cholesky of it, again while R is ill-conditioned
@@ -374,13 +448,14 @@ impl<'a> Krylov<'a> {
             theta: chosen.iter().map(|&k| ritz.values[k]).collect(),
             s: chosen.iter().map(|&k| ritz.couplings[k]).collect(),
             shift: self.factor.shift,
+            loss: std::mem::take(&mut self.loss),
         })
     }
 }
 
 impl Drop for Krylov<'_> {
     fn drop(&mut self) {
-        self.tools.pool.give(self.basis.drain(..));
+        self.tools.pool.give(self.basis.drain(..).chain(self.nearest.drain(..)));
     }
 }
 
@@ -390,6 +465,11 @@ fn add(sum: &mut Small, part: &Small) {
             sum[a][c] += part[a][c];
         }
     }
+}
+
+/// The largest magnitude.
+fn largest(all: &[Small]) -> f64 {
+    all.as_flattened().as_flattened().iter().fold(0.0, |most, x| x.abs().max(most))
 }
 
 fn norm_of(block: &[Row], column: usize) -> f64 {

@@ -9,6 +9,8 @@
 //! F is the noise of the solves. It is measured: α_j = Q_jᵀ Op Q_j is symmetric but for that noise. (With F = 1e-16
 //! ‖Op‖ instead, the estimate was 25 times too low on a mesh of 9,000 vertices and 1,000 times on one of 100,000.)
 
+use std::ops::Range;
+
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
@@ -19,24 +21,60 @@ use crate::eigen::projected::Projected;
 /// Rounding of an inner product of unit vectors.
 const ROUNDING: f64 = 2e-16;
 
+/// How much of the noise counts: until it has been compared with what was measured, at least, and at most.
+const SHARE: [f64; 3] = [1.0, 1e-4, 100.0];
+
+/// By how much the estimate is to stay above what is measured.
+const IN_HAND: f64 = 2.0;
+
+/// By how much a loss grows in a step, until it is known: a step near the shift multiplies by 3 to 50.
+const GROWTH: f64 = 4.0;
+
 /// Ω for the last two blocks of a space: a row for every column of the basis before the block, and the block itself.
 #[derive(Debug, Default)]
 pub(crate) struct Loss {
     now: Vec<Row>,
     before: Vec<Row>,
     noise: f64,
+    /// Along which combinations of columns every block is orthogonalised: what the noise is largest in.
+    deflated: Vec<Vec<f64>>,
+    /// The share of the noise that is not along them, by what repairs have measured.
+    share: Option<f64>,
+    /// The estimates of the last two steps, the last one first; none right after a repair.
+    estimates: [Option<f64>; 2],
     /// For each column that the space started with, the error of what is known of its product with Op.
     inherited: Vec<f64>,
     scale: f64,
 }
 
 impl Loss {
-    /// Both last blocks are orthogonal to everything before them, to rounding. `columns`: before the last block.
-    pub(crate) fn repaired(&mut self, columns: usize, random: &mut ChaCha8Rng) {
+    /// For a space that starts with vectors of this one's, and orthogonalises every block against those columns.
+    pub(crate) fn next(&self, deflated: Range<usize>) -> Loss {
+        let unit = |k: usize| (0..=k).map(|i| if i == k { 1.0 } else { 0.0 }).collect();
+        Loss { deflated: deflated.map(unit).collect(), share: self.share, ..Loss::default() }
+    }
+
+    /// Every block is orthogonalised along these combinations of columns from now on.
+    pub(crate) fn deflate(&mut self, combinations: Vec<Vec<f64>>) {
+        self.deflated = combinations;
+    }
+
+    /// Both last blocks are orthogonal to everything before them, to so many roundings. `columns`: before the last
+    /// block.
+    pub(crate) fn repaired(&mut self, columns: usize, roundings: f64, random: &mut ChaCha8Rng) {
         for (omega, columns) in [(&mut self.now, columns), (&mut self.before, columns.saturating_sub(WIDTH))] {
             omega.clear();
-            omega.extend((0..columns).map(|_| noise(ROUNDING, random)));
+            omega.extend((0..columns).map(|_| noise(roundings * ROUNDING, random)));
             omega.extend(identity());
+        }
+        self.estimates = [None; 2];
+    }
+
+    /// Learns from what a repair has measured how much of the noise counts.
+    pub(crate) fn compare(&mut self, measured: f64) {
+        if let [Some(estimate), _] = self.estimates {
+            let share = self.share.unwrap_or(SHARE[0]) * IN_HAND * measured / estimate;
+            self.share = Some(share.clamp(SHARE[1], SHARE[2]));
         }
     }
 
@@ -55,7 +93,8 @@ impl Loss {
         self.inherited.push(error);
     }
 
-    /// Follows the step that added a block: its α, the R before it and the R after it. Result: the largest entry.
+    /// Follows the step that added a block: its α, the R before it and the R after it. Result: the largest entry to be
+    /// expected after the next step.
     pub(crate) fn step(
         &mut self,
         projected: &Projected,
@@ -68,11 +107,11 @@ impl Loss {
         let inverse = inverse_of_upper(r);
         let back = transpose(r_before);
         let mut next: Vec<Row> = Vec::with_capacity(columns + 2 * WIDTH);
-        let mut most = 0.0f64;
+        let share = self.share.unwrap_or(SHARE[0]);
         for k in 0..columns {
             // F, uniform in ± twice the noise.
             let inherited = self.inherited.get(k).copied().unwrap_or(0.0);
-            let mut sum = noise(2.0 * self.noise.max(inherited) + ROUNDING * self.scale, random);
+            let mut sum = noise(2.0 * share * self.noise.max(inherited) + ROUNDING * self.scale, random);
             let coupled = projected.coupled_to(k);
             let end = coupled.end.min(self.now.len());
             for (h, omega) in projected.row(k)[coupled.start..end].iter().zip(&self.now[coupled.start..end]) {
@@ -88,13 +127,20 @@ impl Loss {
             for a in 0..WIDTH {
                 add_scaled::<Plain>(&mut row, sum[a], &inverse[a]);
             }
-            most = row.iter().fold(most, |most, x| most.max(x.abs()));
             next.push(row);
         }
+        for direction in &self.deflated {
+            let mut along = ZERO;
+            direction.iter().zip(&next).for_each(|(d, row)| add_scaled::<Plain>(&mut along, *d, row));
+            direction.iter().zip(&mut next).for_each(|(d, row)| add_scaled::<Plain>(row, -d, &along));
+        }
+        let most = next.as_flattened().iter().fold(0.0f64, |most, x| most.max(x.abs()));
         next.extend((0..WIDTH).map(|_| noise(ROUNDING, random))); // neighbours are orthogonalised explicitly
         next.extend(identity());
         self.before = std::mem::replace(&mut self.now, next);
-        most
+        let [before, _] = self.estimates;
+        self.estimates = [Some(most), before];
+        most * before.map_or(GROWTH, |before| (most / before).max(1.0))
     }
 }
 

@@ -14,12 +14,15 @@ mod chain;
 mod component;
 mod factor;
 mod finish;
+mod front;
 mod general;
 mod kernel;
 mod krylov;
 mod loss;
 mod memory;
+mod order;
 mod output;
+mod pages;
 mod projected;
 mod seconds;
 mod slice;
@@ -290,7 +293,7 @@ pub fn eigenbasis(operator: &Operator, options: &EigenOptions, watch: &dyn Watch
         .par_iter_mut()
         .zip(&dense)
         .filter(|(_, dense)| !**dense)
-        .try_for_each(|(component, _)| clock.time(Step::Order, || component.prepare()))?;
+        .try_for_each(|(component, _)| clock.time(Step::Order, || component.prepare(kind)))?;
 
     let expected = memory::expected(&components, &dense, count, operator.vertex_mass.len());
     memory::check(expected, memory_limit)?;

@@ -8,10 +8,14 @@ use rayon::prelude::*;
 use crate::eigen::block::{Block, Row, WIDTH};
 use crate::eigen::component::{Component, Pairs};
 use crate::eigen::finish::Evidence;
+use crate::eigen::kernel::prefetch;
 use crate::operator::Operator;
 
 /// Blocks that are read together before any of their rows is written.
 const TOGETHER: usize = 4;
+
+/// How many vertices ahead of its use a row is asked for.
+const AHEAD: usize = 16;
 
 /// A vertex, its row in the component, and 1 / √mass.
 type Place = (u32, u32, f64);
@@ -95,7 +99,10 @@ fn write(
         done += same.len();
     }
     jobs.into_par_iter().for_each(|(block, places, scales, rows)| {
-        for &(vertex, row, inverse) in vertices {
+        for (i, &(vertex, row, inverse)) in vertices.iter().enumerate() {
+            if let Some(later) = vertices.get(i + AHEAD) {
+                prefetch(block, later.1 as usize);
+            }
             let values = &block[row as usize];
             for ((phi, place), scale) in rows.iter_mut().zip(places).zip(scales) {
                 phi[vertex as usize] = values[place % WIDTH] * (scale * inverse);

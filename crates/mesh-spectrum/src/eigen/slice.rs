@@ -2,7 +2,7 @@
 //!
 //! A slice knows from an inertia count how many pairs it has to find on its left, and runs until it has them.
 
-use crate::eigen::block::{Pool, Row, ZERO};
+use crate::eigen::block::{Pool, Row, WIDTH, ZERO};
 use crate::eigen::factor::Factor;
 use crate::eigen::kernel::{self, Kind};
 use crate::eigen::krylov::{Handover, Krylov};
@@ -26,6 +26,8 @@ pub(crate) struct Tools<'a> {
     pub(crate) top: f64,
     /// The residual allowed, relative to `top`.
     pub(crate) tolerance: f64,
+    /// An upper bound of A's largest eigenvalue.
+    pub(crate) norm: f64,
 }
 
 /// What a slice is asked for.
@@ -87,7 +89,7 @@ pub(crate) fn slice<'a>(
     let mut next = foreseen.unwrap_or(90 + 12 * (left + right) / 5 + left.abs_diff(right));
     loop {
         tools.progress.go_on()?;
-        space.step();
+        space.step()?;
         if space.dimension() < next && space.can_grow() {
             continue;
         }
@@ -152,38 +154,17 @@ impl Slice<'_> {
     }
 
     /// Writes the vectors into blocks of eight, the last one filled up with zeros, and makes their residuals small.
-    pub(crate) fn vectors(&self, tools: &Tools, into: &mut [&mut [Row]]) -> Result<(), Trouble> {
+    /// Result: ‖A x − λ x‖ of each.
+    pub(crate) fn vectors(&self, tools: &Tools, into: &mut [&mut [Row]]) -> Result<Vec<f64>, Trouble> {
         self.space.vectors(&self.ritz, &self.chosen, into)?;
-        tools.progress.clock.time(Step::Vectors, || self.settle(tools, into))
-    }
-
-    /// Polishes the vectors if their residuals ask for it.
-    fn settle(&self, tools: &Tools, into: &mut [&mut [Row]]) -> Result<(), Trouble> {
-        let Tools { matrix, kind, .. } = *tools;
-        // A tenth in hand, because λ_K lies a little below the top; and no less than rounding leaves.
-        let norm = norm(matrix);
-        let allowed = (0.9 * tools.tolerance * tools.top).max(ROUNDING * norm);
-        let residual = |into: &[&mut [Row]]| {
-            let each = into.iter().zip(self.eigenvalues.chunks(8)).map(|(x, some)| {
-                let (mut eigenvalues, mut squares) = (ZERO, ZERO);
-                eigenvalues[..some.len()].copy_from_slice(some);
-                kernel::residual(kind, matrix, x, &eigenvalues, &mut squares);
-                squares.into_iter().fold(0.0, f64::max).sqrt()
-            });
-            each.fold(0.0, f64::max)
-        };
-        let mut most = residual(into);
-        for _ in 0..POLISH_MAX {
-            if most <= 0.5 * allowed {
-                break;
-            }
-            polish(tools, norm, into, &self.eigenvalues)?;
-            most = residual(into);
-        }
-        if most.is_nan() || most > allowed {
-            return Err(Trouble::Again(format!("residual {most:e}, {allowed:e} allowed")));
-        }
-        Ok(())
+        tools.progress.clock.time(Step::Vectors, || {
+            let mut scratch = tools.pool.take(tools.matrix.rows() + 1);
+            let blocks = into.iter_mut().zip(self.eigenvalues.chunks(WIDTH));
+            let residuals = blocks.map(|(block, eigenvalues)| settle(tools, block, eigenvalues, &mut scratch));
+            let residuals = residuals.collect::<Result<Vec<_>, Trouble>>();
+            tools.pool.give([scratch]);
+            Ok(residuals?.concat())
+        })
     }
 
     /// Leaves the `count` vectors above the slice (a multiple of eight, or as many as there are) to the next one.
@@ -203,40 +184,57 @@ const POLISH_MAX: usize = 3;
 /// Degree of the polishing polynomial; 3 to 5 serve.
 const POLISH_DEGREE: usize = 4;
 
+/// Polishes a block of vectors if their residuals ask for it; returns these.
+fn settle(tools: &Tools, block: &mut [Row], eigenvalues: &[f64], scratch: &mut [Row]) -> Result<Vec<f64>, Trouble> {
+    let Tools { matrix, kind, norm, .. } = *tools;
+    // A tenth in hand, because λ_K lies a little below the top; and no less than rounding leaves.
+    let allowed = (0.9 * tools.tolerance * tools.top).max(ROUNDING * norm);
+    let mut shifts = ZERO;
+    shifts[..eigenvalues.len()].copy_from_slice(eigenvalues);
+    let mut polished = 0;
+    loop {
+        tools.progress.go_on()?;
+        let mut squares = ZERO;
+        kernel::residual(kind, matrix, block, &shifts, &mut squares);
+        let most = squares.into_iter().fold(0.0, f64::max).sqrt();
+        if most <= 0.5 * allowed || (polished == POLISH_MAX && most <= allowed) {
+            return Ok(squares[..eigenvalues.len()].iter().map(|square| square.sqrt()).collect());
+        }
+        if polished == POLISH_MAX || squares.iter().any(|square| square.is_nan()) {
+            return Err(Trouble::Again(format!("residual {most:e}, {allowed:e} allowed")));
+        }
+        polish(tools, block, eigenvalues, scratch);
+        polished += 1;
+    }
+}
+
 /// x ← T_d(t(A)) x / T_d(t(λ)) with the Chebyshev polynomial T_d, t mapping [‖A‖/8, ‖A‖] to [−1, 1]: damps the rounding
 /// noise at the upper end of the spectrum, which the residual multiplies by ‖A‖/λ_K, and leaves the pair alone.
-fn polish(tools: &Tools, high: f64, vectors: &mut [&mut [Row]], eigenvalues: &[f64]) -> Result<(), EigenError> {
-    let Tools { matrix, pool, kind, .. } = *tools;
-    let n = matrix.rows();
-    let (centre, half) = (high * (1.0 + 0.125) / 2.0, high * (1.0 - 0.125) / 2.0);
-    let mut scratch = pool.take(n + 1);
-    for (block, eigenvalues) in vectors.iter_mut().zip(eigenvalues.chunks(8)) {
-        tools.progress.go_on()?;
-        let [mut before, mut now]: [&mut [Row]; 2] = [block, &mut scratch[..n]];
-        kernel::sparse(kind, matrix, before, now, [1.0 / half, -centre / half, 0.0]);
+fn polish(tools: &Tools, block: &mut [Row], eigenvalues: &[f64], scratch: &mut [Row]) {
+    let Tools { matrix, kind, norm, .. } = *tools;
+    let (centre, half) = (norm * (1.0 + 0.125) / 2.0, norm * (1.0 - 0.125) / 2.0);
+    let [mut before, mut now]: [&mut [Row]; 2] = [block, &mut scratch[..matrix.rows()]];
+    kernel::sparse(kind, matrix, before, now, [1.0 / half, -centre / half, 0.0]);
+    for _ in 1..POLISH_DEGREE {
+        // T_{d+1} = 2 t T_d − T_{d−1}, in place of T_{d−1}.
+        kernel::sparse(kind, matrix, now, before, [2.0 / half, -2.0 * centre / half, -1.0]);
+        [before, now] = [now, before];
+    }
+    let mut scale = ZERO;
+    for (k, eigenvalue) in eigenvalues.iter().enumerate() {
+        let t = (eigenvalue - centre) / half;
+        let (mut before, mut value) = (1.0, t);
         for _ in 1..POLISH_DEGREE {
-            // T_{d+1} = 2 t T_d − T_{d−1}, in place of T_{d−1}.
-            kernel::sparse(kind, matrix, now, before, [2.0 / half, -2.0 * centre / half, -1.0]);
-            [before, now] = [now, before];
+            (before, value) = (value, 2.0 * t * value - before);
         }
-        let mut scale = ZERO;
-        for (k, eigenvalue) in eigenvalues.iter().enumerate() {
-            let t = (eigenvalue - centre) / half;
-            let (mut before, mut value) = (1.0, t);
-            for _ in 1..POLISH_DEGREE {
-                (before, value) = (value, 2.0 * t * value - before);
-            }
-            scale[k] = 1.0 / value;
-        }
-        for (x, y) in before.iter_mut().zip(now.iter_mut()) {
-            for k in 0..8 {
-                let value = y[k] * scale[k];
-                (x[k], y[k]) = (value, value); // one of them is the block
-            }
+        scale[k] = 1.0 / value;
+    }
+    for (x, y) in before.iter_mut().zip(now.iter_mut()) {
+        for k in 0..WIDTH {
+            let value = y[k] * scale[k];
+            (x[k], y[k]) = (value, value); // one of them is the block
         }
     }
-    pool.give([scratch]);
-    Ok(())
 }
 
 /// An upper bound of A's largest eigenvalue: the largest sum of |entries| of a row (Gershgorin).

@@ -13,10 +13,10 @@ use crate::eigen::kernel::{Arithmetic, add_scaled, prefetch};
 pub(crate) struct Supernode {
     pub(crate) begin: usize,
     pub(crate) width: usize,
-    /// `width`, rounded up to a multiple of 4: columns a group of rows is stored with.
+    /// Columns a group of rows is stored with: `width`, rounded up to a multiple of 4 from 3 on.
     pub(crate) stride: usize,
     /// Where its diagonal block starts in `values`: group g of eight rows takes 8 (g + 1) columns, the last one no
-    /// more than there are.
+    /// more than there are. A single column has none.
     pub(crate) diagonal: usize,
     /// Where the rows below start in `values`: `stride` columns a group.
     pub(crate) below: usize,
@@ -61,19 +61,31 @@ pub(crate) fn solve_with<A: Arithmetic, const R: usize, const HIGH: usize, const
         *scratch = ZERO;
     }
     for supernode in &factor.layout.supernodes {
-        forward::<A, HIGH>(factor, supernode, x);
+        match supernode.width {
+            1 => forward_narrow::<A, 1>(factor, supernode, x),
+            2 => forward_narrow::<A, 2>(factor, supernode, x),
+            _ => forward::<A, HIGH>(factor, supernode, x),
+        }
     }
     if let Some(scratch) = x.last_mut() {
         *scratch = ZERO;
     }
-    for (number, supernode) in factor.layout.supernodes.iter().enumerate().rev() {
-        prefetch_backward(factor, number, x);
-        backward::<A, HIGH>(factor, supernode, x);
+    let mut asked = Asked { values: factor.layout.len, rows: factor.layout.rows.len() };
+    for supernode in factor.layout.supernodes.iter().rev() {
+        asked.go_on(factor, supernode, x);
+        match supernode.width {
+            1 => backward_narrow::<A, 1>(factor, supernode, x),
+            2 => backward_narrow::<A, 2>(factor, supernode, x),
+            _ => backward::<A, HIGH>(factor, supernode, x),
+        }
     }
 }
 
 /// How far ahead of its use the factor is asked for, in rows of 64 bytes.
 const AHEAD: usize = 128;
+
+/// How far ahead of their use rows of x are asked for, in row numbers.
+const ROWS_AHEAD: usize = 48;
 
 /// Σ_j l_j xⱼᵀ over the columns of a group of eight rows of L, HIGH rows at once.
 #[inline(always)]
@@ -121,9 +133,7 @@ fn forward<A: Arithmetic, const HIGH: usize>(factor: &Packed, s: &Supernode, x: 
     let first = s.begin + s.width;
     for g in 0..s.groups {
         let rows = &factor.layout.rows[s.rows + WIDTH * g..][..WIDTH];
-        for &row in rows {
-            prefetch(tail, row as usize - first);
-        }
+        prefetch_forward(factor, s.rows + WIDTH * g, tail, first);
         let known = group::<A, HIGH>(&factor.values, s.below + g * s.stride, own);
         for r in 0..WIDTH {
             let row = &mut tail[rows[r] as usize - first];
@@ -205,16 +215,84 @@ fn above<A: Arithmetic, const COLUMNS: usize>(
     sum
 }
 
-/// Asks for the first lines that a supernode's part of the second sweep will read.
+/// Asks for the rows that the first sweep comes to soon after the group whose row numbers start at `at`.
 #[inline(always)]
-fn prefetch_backward(factor: &Packed, number: usize, x: &[Row]) {
-    let Some(far) = number.checked_sub(3) else { return };
-    let start = factor.layout.supernodes[far].diagonal;
-    for line in start..factor.layout.supernodes[far + 1].diagonal.min(start + 64) {
-        prefetch(&factor.values, line);
+fn prefetch_forward(factor: &Packed, at: usize, tail: &[Row], first: usize) {
+    for &row in factor.layout.rows.iter().skip(at + ROWS_AHEAD).take(WIDTH) {
+        prefetch(tail, row as usize - first); // a later supernode's rows are later rows
     }
-    let near = &factor.layout.supernodes[number - 1];
-    for row in &factor.layout.rows[near.rows..][..(WIDTH * near.groups).min(32)] {
-        prefetch(x, *row as usize);
+}
+
+/// Down to where the second sweep has asked for what it will read.
+struct Asked {
+    values: usize,
+    rows: usize,
+}
+
+impl Asked {
+    /// Asks for what comes soon after a supernode.
+    #[inline(always)]
+    fn go_on(&mut self, factor: &Packed, s: &Supernode, x: &[Row]) {
+        let until = s.diagonal.saturating_sub(AHEAD);
+        (until..self.values.min(s.diagonal)).rev().for_each(|line| prefetch(&factor.values, line));
+        self.values = until;
+        let until = s.rows.saturating_sub(ROWS_AHEAD);
+        let rows = &factor.layout.rows[until..self.rows.min(s.rows).max(until)];
+        rows.iter().rev().for_each(|&row| prefetch(x, row as usize));
+        self.rows = until;
+    }
+}
+
+/// [`forward`] for a supernode of one or two columns: leaves of the elimination tree, of which there are many.
+#[inline(always)]
+fn forward_narrow<A: Arithmetic, const W: usize>(factor: &Packed, s: &Supernode, x: &mut [Row]) {
+    let first = s.begin + W;
+    let (head, tail) = x.split_at_mut(first);
+    let own: &mut [Row; W] = (&mut head[s.begin..]).try_into().unwrap_or_else(|_| unreachable!("W rows"));
+    if W == 2 {
+        let solved = own[0];
+        add_scaled::<A>(&mut own[1], -factor.values[s.diagonal][1], &solved);
+    }
+    let minus = own.map(|row| row.map(|x| -x));
+    for g in 0..s.groups {
+        let start = s.below + g * W;
+        prefetch(&factor.values, start + AHEAD);
+        prefetch_forward(factor, s.rows + WIDTH * g, tail, first);
+        let l = &factor.values[start..][..W];
+        let rows = &factor.layout.rows[s.rows + WIDTH * g..][..WIDTH];
+        for r in 0..WIDTH {
+            let row = &mut tail[rows[r] as usize - first];
+            for j in 0..W {
+                add_scaled::<A>(row, l[j][r], &minus[j]);
+            }
+        }
+    }
+}
+
+/// [`backward`] for a supernode of one or two columns.
+#[inline(always)]
+fn backward_narrow<A: Arithmetic, const W: usize>(factor: &Packed, s: &Supernode, x: &mut [Row]) {
+    // Several sums, because each addition waits for the one before it.
+    let mut sums = [[ZERO; 4]; W];
+    for g in 0..s.groups {
+        let l = &factor.values[s.below + g * W..][..W];
+        let rows = &factor.layout.rows[s.rows + WIDTH * g..][..WIDTH];
+        for r in 0..WIDTH {
+            let row = x[rows[r] as usize];
+            for j in 0..W {
+                add_scaled::<A>(&mut sums[j][r % 4], l[j][r], &row);
+            }
+        }
+    }
+    for j in (0..W).rev() {
+        let mut own = x[s.begin + j];
+        let inverse = factor.inverse[s.begin + j];
+        for k in 0..WIDTH {
+            own[k] = own[k] * inverse - ((sums[j][0][k] + sums[j][1][k]) + (sums[j][2][k] + sums[j][3][k]));
+        }
+        if W == 2 && j == 0 {
+            add_scaled::<A>(&mut own, -factor.values[s.diagonal][1], &x[s.begin + 1]);
+        }
+        x[s.begin + j] = own;
     }
 }

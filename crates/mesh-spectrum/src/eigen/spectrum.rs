@@ -146,5 +146,6 @@ impl Pairs {
     fn truncate(&mut self, count: usize) {
         self.eigenvalues.truncate(count);
         self.places.truncate(count);
+        self.residuals.iter_mut().for_each(|residuals| residuals.truncate(count));
     }
 }
