@@ -1,0 +1,86 @@
+"""lasso-python's `dimred`, as far as it runs: what its functions give, and what stops the others.
+
+Its command line samples 2000 nodes, reduces the displacements of each time step to at most ten numbers by a singular value
+decomposition ("betas") and clusters them; `hashing` makes curves of a field along eigenvectors, `sphere` a field on a
+sphere around the part.
+"""
+
+import warnings
+from importlib.metadata import version
+
+import numpy as np
+from lasso.dimred import graph_laplacian, hashing, hashing_sphere
+from lasso.dimred.sphere import algorithms as sphere
+from lasso.dimred.svd import clustering_betas, pod_functions, subsampling_methods
+from quality import cosine
+
+VERSION = version("lasso-python")
+HASH_MODES, HASH_POINTS = 5, 100  # the defaults of run_graph_laplacian and compute_hashes
+
+
+class Betas:
+    """The decomposition of all runs' positions: R x 10 numbers of the last state, and the way back."""
+
+    def __init__(self, case):
+        import bundles
+
+        states = bundles.shapes(case.bundle, every_state=True)
+        positions = np.array([run[: min(map(len, states))] for run in states])
+        basis, betas = pod_functions.calculate_v_and_betas(positions)
+        self.basis, self.betas, self.rest = basis[:, -1], betas[:, -1], case.rest
+
+    def shape(self, run):
+        return self.rest + (self.betas[run] @ self.basis).reshape(-1, 3)
+
+    def groups(self, count):
+        """k-means of the last betas as the command line does it; a label for each run."""
+        rows = np.arange(len(self.betas))
+        _, members = clustering_betas.group_betas(rows, self.betas, cluster="kmeans", cluster_params={"n_clusters": count})
+        found = np.zeros(len(rows), int)
+        for group, ids in enumerate(members):
+            found[np.asarray(ids, int)] = group
+        return found
+
+
+def hash_similarities(case):
+    """R x R: for each of x, y, z the field's curves along the first eigenvectors that are not constant; cosine of the curves
+    by `curve_normalizer`'s integral, weighted by `get_mode_weights_inv`, mean of x, y, z.
+
+    The graph Laplacian does not run, so eigenvectors are the study's; the mesh is the same for all runs, so none is matched
+    or turned."""
+    positive = np.flatnonzero(case.bundle.eigenvalues > 1e-9 * case.bundle.eigenvalues[-1])[:HASH_MODES]
+    vectors, weights = case.bundle.eigenvectors[positive].T, hashing.get_mode_weights_inv(case.bundle.eigenvalues[positive])
+    curves = np.array([[[y for _, y in hashing.compute_hashes(vectors, run[:, axis], HASH_POINTS)] for axis in range(3)] for run in case.displacements])
+    curves = curves / np.maximum(np.linalg.norm(curves, axis=-1, keepdims=True), 1e-300)  # R x 3 x modes x points
+    return np.einsum("racp,sacp,c->rs", curves, curves, weights) / 3
+
+
+def sphere_similarities(case):
+    """R x R: x, y and z of the displacement on the sphere around the undeformed part, their hashes end to end."""
+    histogram = sphere.create_histogram(case.rest)
+    hashes = np.array([np.concatenate([sphere.sphere_hashing(histogram, run[:, axis]) for axis in range(3)]) for run in case.displacements])
+    hashes = hashes[:, np.any(hashes != 0, axis=0)]
+    return np.array([cosine(hashes, row) for row in hashes])
+
+
+def what_stops(case, run_file):
+    """Function, what it said: those that do not run here."""
+    vectors = case.bundle.eigenvectors[:6].T
+    tried = {
+        "`dimred` (command line), at `create_reference_subsample`": lambda: subsampling_methods.create_reference_subsample(run_file, []),
+        "`graph_laplacian.run_graph_laplacian`": lambda: graph_laplacian.run_graph_laplacian(case.rest),
+        "the same, without its filter of warnings": lambda: graph_laplacian._laplacian(graph_laplacian._laplacian_gauss_idw(case.rest)),
+        "`hashing.run_hash_comparison`, at `curve_normalizer`": lambda: hashing.curve_normalizer(np.linspace(0, 1, 5), np.ones(5)),
+        "`hashing_sphere.compute_hashes`, at `_create_sphere_mesh`": lambda: hashing_sphere._create_sphere_mesh(np.linalg.norm(np.ptp(vectors, axis=0))),
+    }
+    out = []
+    for name, call in tried.items():
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
+                found = call()
+            said = f'"{found}"' if isinstance(found, str) else "runs"
+        except Exception as error:
+            said = f"{type(error).__name__}: {error}"
+        out.append([name, said.replace("|", "/")])
+    return out
