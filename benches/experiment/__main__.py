@@ -20,9 +20,12 @@ import drawing
 import pages
 import pictures
 import ranking
+import robustness
+import unseen
+import curves
 from cases import Case
 
-SECTIONS = [ranking, pictures]
+SECTIONS = [ranking, unseen, curves, robustness, pictures]
 
 
 def arguments():
@@ -80,7 +83,7 @@ def main():
         for name, make in getattr(section, "TABLES", {}).items():
             if wanted(name):
                 start = time.time()
-                made[name] = make(bench)
+                made[name] = make(bench) or "Not made: the fine bundle is not there."
                 print(f"### {name}\n\n{made[name]}\n", flush=True)
                 print(f"{name}: {time.time() - start:.1f} s", file=sys.stderr)
         for name, draw in getattr(section, "PICTURES", {}).items():

@@ -39,6 +39,12 @@ class Case:
         return self.shapes - self.rest
 
     @cached_property
+    def products(self):
+        """Products of the runs' displacements over the surface, R x R."""
+        rows = (self.displacements * np.sqrt(self.mass)[:, None]).reshape(len(self.runs), -1)
+        return rows @ rows.T
+
+    @cached_property
     def compared(self):
         return self.ask("compare", "--labels", self.labels)
 

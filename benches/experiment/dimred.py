@@ -5,13 +5,17 @@ decomposition ("betas") and clusters them; `hashing` makes curves of a field alo
 sphere around the part.
 """
 
+import os
 import warnings
 from importlib.metadata import version
 
+import bundles
+import h5py
 import numpy as np
 from lasso.dimred import graph_laplacian, hashing, hashing_sphere
 from lasso.dimred.sphere import algorithms as sphere
 from lasso.dimred.svd import clustering_betas, pod_functions, subsampling_methods
+from lasso.dimred.svd.keyword_types import ClusterType
 from quality import cosine
 
 VERSION = version("lasso-python")
@@ -22,8 +26,6 @@ class Betas:
     """The decomposition of all runs' positions: R x 10 numbers of the last state, and the way back."""
 
     def __init__(self, case):
-        import bundles
-
         states = bundles.shapes(case.bundle, every_state=True)
         positions = np.array([run[: min(map(len, states))] for run in states])
         basis, betas = pod_functions.calculate_v_and_betas(positions)
@@ -35,7 +37,7 @@ class Betas:
     def groups(self, count):
         """k-means of the last betas as the command line does it; a label for each run."""
         rows = np.arange(len(self.betas))
-        _, members = clustering_betas.group_betas(rows, self.betas, cluster="kmeans", cluster_params={"n_clusters": count})
+        _, members = clustering_betas.group_betas(rows, self.betas, cluster=ClusterType.KMeans, cluster_params={"n_clusters": count})
         found = np.zeros(len(rows), int)
         for group, ids in enumerate(members):
             found[np.asarray(ids, int)] = group
@@ -63,15 +65,24 @@ def sphere_similarities(case):
     return np.array([cosine(hashes, row) for row in hashes])
 
 
-def what_stops(case, run_file):
+def hashes_of_files(case, scratch):
+    """`hashing_sphere.compute_hashes` on a folder as it documents it: `xyz` and `fields` of each run."""
+    folder = os.path.join(scratch, "sphere", "")
+    os.makedirs(folder, exist_ok=True)
+    with h5py.File(folder + "run_0.h5", "w") as file:
+        file["xyz"], file["fields"] = case.shapes[0][:, None], case.displacements[0][:, None, 2]
+    return hashing_sphere.compute_hashes(folder, n_files=1, ret_vals=True)
+
+
+def what_stops(case, run_file, scratch):
     """Function, what it said: those that do not run here."""
-    vectors = case.bundle.eigenvectors[:6].T
+    x = np.linspace(0, 1, 5)
     tried = {
         "`dimred` (command line), at `create_reference_subsample`": lambda: subsampling_methods.create_reference_subsample(run_file, []),
         "`graph_laplacian.run_graph_laplacian`": lambda: graph_laplacian.run_graph_laplacian(case.rest),
         "the same, without its filter of warnings": lambda: graph_laplacian._laplacian(graph_laplacian._laplacian_gauss_idw(case.rest)),
-        "`hashing.run_hash_comparison`, at `curve_normalizer`": lambda: hashing.curve_normalizer(np.linspace(0, 1, 5), np.ones(5)),
-        "`hashing_sphere.compute_hashes`, at `_create_sphere_mesh`": lambda: hashing_sphere._create_sphere_mesh(np.linalg.norm(np.ptp(vectors, axis=0))),
+        "`hashing.run_hash_comparison`, at `curve_normalizer`": lambda: hashing.curve_normalizer(x, x),
+        "`hashing_sphere.compute_hashes`": lambda: hashes_of_files(case, scratch),
     }
     out = []
     for name, call in tried.items():

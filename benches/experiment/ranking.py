@@ -45,7 +45,7 @@ def nearest(bench):
 
 def methods(case):
     """Name, numbers of a query of each mode, query -> similarities: the descriptor and all its rivals."""
-    size = {select: {mode: len(rivals.chosen(case, select, case.queries[mode])) for mode in MODES} for select in SELECTS}
+    size = {select: {mode: case.row(mode, select, "descriptor")["size"] for mode in MODES} for select in SELECTS}
     every = rivals.Pca(case, np.arange(len(case.runs)))
     times = lambda factor, select="difference": {mode: factor * count for mode, count in size[select].items()}
     same = lambda count: dict.fromkeys(MODES, count)
@@ -53,8 +53,8 @@ def methods(case):
     out = []
     for select in SELECTS:
         words = {"coordinates": "coordinates", "difference": "differences"}[select]
-        out += [(f"**descriptor**, {words}", times(3, select), rivals.descriptor(case, select)), (f"first M, {words}", times(3, select), rivals.first(case, select)),
-                (f"first 500, {words}", same(1500), rivals.first(case, select, 500))]
+        out += [(f"**descriptor**, {words}", times(3, select), rivals.descriptor(case.values[select])), (f"first M, {words}", times(3, select), rivals.first(case.values[select])),
+                (f"first 500, {words}", same(1500), rivals.first(case.values[select], 500))]
     out += [("PCA, M components", times(1), rivals.components(case, every)), ("PCA, 3M components", times(3), rivals.components(case, every, 3))]
     out += [("M hand-picked nodes", times(3), rivals.hand_picked(case)), ("dimred: betas", same(betas.betas.shape[1]), rivals.of_rows(betas.betas)),
             ("dimred: hashes", same(3 * dimred.HASH_MODES * dimred.HASH_POINTS), lambda query: hashes[query]), ("dimred: sphere", same("–"), lambda query: spheres[query]),
@@ -122,7 +122,6 @@ def cloud_separates(bench):
         groups = KMeans(3, n_init=20, random_state=1).fit_predict(points)
         rows.append([words, f"{(label[distance.argmin(1)] == label).mean():.2f}", f"{adjusted_rand_score(label, groups):.2f}"])
     return table(["coefficients", "nearest run has the same label", "three k-means groups, adjusted Rand index"], rows)
-
 
 
 TABLES = {"sizes": sizes, "cloud": cloud_separates, "nearest": nearest, "ranking": ranking, "confusion": confusion, "modes": modes_found}

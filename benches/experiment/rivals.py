@@ -10,65 +10,58 @@ from quality import cosine
 
 
 class Pca:
-    """Principal components of last displacements, in the inner product weighted by the area, centred by their mean."""
+    """Principal components of last displacements, in the inner product weighted by the area, centred by their mean.
+
+    Everything follows from the runs' products with each other, so that a thousand of these cost nothing."""
 
     def __init__(self, case, train):
-        self.case, self.root = case, np.sqrt(case.mass)[:, None]
-        rows = (case.displacements[train] * self.root).reshape(len(train), -1)
-        self.mean = rows.mean(0)
-        _, size, directions = np.linalg.svd(rows - self.mean, full_matrices=False)
-        self.directions = directions[size > 1e-9 * size[0]]  # C x 3N
-
-    def scores(self, runs=slice(None)):
-        """R x C."""
-        rows = (self.case.displacements[runs] * self.root).reshape(len(self.case.displacements[runs]), -1)
-        return (rows - self.mean) @ self.directions.T
+        products, train = case.products, np.asarray(train)
+        to_mean = products[:, train].mean(1)
+        self.centred = products - to_mean[:, None] - to_mean[None] + to_mean[train].mean()  # R x R
+        squares, vectors = np.linalg.eigh(self.centred[np.ix_(train, train)])
+        squares, vectors = squares[::-1], vectors[:, ::-1]
+        kept = squares > 1e-10 * squares[0]
+        self.scores = self.centred[:, train] @ vectors[:, kept] / np.sqrt(squares[kept])  # R x C
+        self.area = case.mass.sum()
 
     def errors(self, runs):
         """RMS error of the nearest displacement that mean and the first 0, 1, ..., C components make, R x (C + 1)."""
-        rows = (self.case.displacements[runs] * self.root).reshape(len(runs), -1) - self.mean
-        caught = np.cumsum((rows @ self.directions.T) ** 2, axis=1)
-        left = (rows**2).sum(1)[:, None] - np.column_stack([np.zeros(len(rows)), caught])
-        return np.sqrt(np.maximum(left, 0) / self.case.mass.sum())
-
-    def nodes(self, run, count):
-        """The displacement from the first `count` components, N x 3."""
-        row = (self.case.displacements[run] * self.root).ravel() - self.mean
-        near = self.mean + (row @ self.directions[:count].T) @ self.directions[:count]
-        return near.reshape(-1, 3) / self.root
+        caught = np.cumsum(self.scores[runs] ** 2, axis=1)
+        left = np.diag(self.centred)[runs][:, None] - np.column_stack([np.zeros(len(runs)), caught])
+        return np.sqrt(np.maximum(left, 0) / self.area)
 
 
-def chosen(case, select_by, query):
-    """Eigenvectors of the paper's descriptor of a run, counted from 0."""
-    return select(case.values[select_by][query])
-
-
-def descriptor(case, select_by):
-    """query -> similarities by the query's own descriptor."""
+def descriptor(values):
+    """query -> similarities by the query's own descriptor (the paper's rule); `values` are R x K x 3."""
 
     def similarity(query):
-        kept = chosen(case, select_by, query)
-        return cosine(case.values[select_by][:, kept], case.values[select_by][query, kept])
+        kept = select(values[query])
+        return cosine(values[:, kept], values[query, kept])
 
     return similarity
 
 
-def first(case, select_by, count=None):
+def first(values, count=None):
     """query -> similarities by as many eigenvectors of lowest frequency as its descriptor has, or by `count`."""
 
     def similarity(query):
-        size = count or len(chosen(case, select_by, query))
-        return cosine(case.values[select_by][:, :size], case.values[select_by][query, :size])
+        size = count or len(select(values[query]))
+        return cosine(values[:, :size], values[query, :size])
 
     return similarity
+
+
+def size_of(case, query):
+    """M of a run's descriptor of differences, which components and nodes are as many as."""
+    return len(select(case.values["difference"][query]))
 
 
 def components(case, pca, share=1):
     """query -> similarities by M principal components, or `share` times as many, M that of its descriptor of differences."""
-    scores = pca.scores()
+    scores = pca.scores
 
     def similarity(query):
-        size = share * len(chosen(case, "difference", query))
+        size = share * size_of(case, query)
         return cosine(scores[:, :size], scores[query, :size])
 
     return similarity
@@ -88,7 +81,7 @@ def hand_picked(case):
     """query -> similarities by the displacements of M hand-picked nodes, M that of its descriptor of differences."""
 
     def similarity(query):
-        nodes = stations(case, len(chosen(case, "difference", query)))
+        nodes = stations(case, size_of(case, query))
         return cosine(case.displacements[:, nodes], case.displacements[query, nodes])
 
     return similarity

@@ -1,0 +1,81 @@
+"""PCA and deformations that it was not trained on: the paper's argument for a basis made of the part's geometry alone.
+
+A set of runs is taken out; each of them is then rebuilt and is the query of a ranking. Trained *with* them, PCA has seen the
+very run; *each left out*, all others of its kind; *unseen*, none of its kind (mixed runs, which are half of one kind, are out as well).
+"""
+
+import csv
+
+import dimred
+import numpy as np
+import rivals
+from cases import MODES
+from pages import table
+from quality import mean_average_precision
+
+
+def spectral_errors(case, runs, count_of, sort):
+    """RMS error of differences rebuilt from the eigenvectors of largest coefficient, or of lowest frequency, by run."""
+    out = []
+    for run in runs:
+        values, whole = case.bundle.delta[run], case.rms(case.displacements[run])
+        energy = (values**2).sum(1)
+        if sort:
+            energy = energy[np.argsort(-np.abs(values).max(1), kind="stable")]
+        left = whole**2 - energy[: count_of(run)].sum() / case.mass.sum()
+        out.append(np.sqrt(max(left, 0)))
+    return np.array(out)
+
+
+def folds_at_the_hit_end(case):
+    """Clear crush runs whose folds lie beyond the middle of the beam (labels.csv)."""
+    with open(case.labels, newline="") as file:
+        rows = {row["run"]: row for row in csv.DictReader(file)}
+    beyond = [float(rows[run]["fold_position_mm"]) > case.rest[:, 0].max() / 2 for run in case.runs]
+    return np.flatnonzero((case.label == "crush") & case.bundle.clear & np.array(beyond))
+
+
+def unseen(bench):
+    case, rows = bench.cases["apart"], []
+    everything, size = np.arange(len(case.runs)), lambda run: rivals.size_of(case, run)
+    kinds = {mode: (case.members(mode), np.flatnonzero((case.label != mode) & (case.label != "mixed"))) for mode in MODES}
+    hit = folds_at_the_hit_end(case)
+    kinds["crush at the hit end"] = hit, np.setdiff1d(everything, hit)
+    for kind, (runs, others) in kinds.items():
+        whole = case.rms(case.displacements[runs])
+        ranks = lambda similarity: f"{mean_average_precision(similarity, case.label, runs):.3f}"
+        delta = case.values["difference"]
+        found = [("descriptor", "3M", spectral_errors(case, runs, size, True), ranks(rivals.descriptor(delta))), ("first M", "3M", spectral_errors(case, runs, size, False), ranks(rivals.first(delta)))]
+        trained = {"with them": rivals.Pca(case, everything), "unseen": rivals.Pca(case, others)}
+        alone = {run: rivals.Pca(case, np.setdiff1d(everything, [run])) for run in runs}
+        for share, numbers in ((1, "M"), (3, "3M")):
+            at = lambda errors, run: errors[min(share * size(run), len(errors) - 1)]
+            for words in ("with them", "each left out", "unseen"):
+                of = (lambda run: alone[run]) if words == "each left out" else (lambda run: trained[words])
+                errors = np.array([at(of(run).errors([run])[0], run) for run in runs])
+                found.append((f"PCA, {words}", numbers, errors, ranks(lambda run: rivals.components(case, of(run), share)(run))))
+        rows += [[f"{kind} ({len(runs)} runs)" if method == "descriptor" else "", method, numbers, f"{errors.mean():.1f}", f"{100 * (errors / whole).mean():.1f} %", f"{100 * (errors / whole).max():.1f} %", rank]
+                 for method, numbers, errors, rank in found]
+    return table(["runs", "rebuilt from", "numbers", "mean error, mm", "of the displacement", "worst run", "mean AP"], rows, 3)
+
+
+def lasso(bench):
+    case = bench.cases["apart"]
+    run_file = f"{case.bundle.runs_folder}/{case.runs[0]}/d3plot"
+    return table(["function of lasso-python " + dimred.VERSION, "what it says"], dimred.what_stops(case, run_file, bench.options.scratch), 2)
+
+
+def lasso_rebuilds(bench):
+    """Errors of the shapes that the ten betas rebuild, and groups of them."""
+    from sklearn.metrics import adjusted_rand_score
+
+    case = bench.cases["apart"]
+    betas = dimred.Betas(case)
+    errors = np.array([case.rms(betas.shape(run) - case.shapes[run]) / case.rms(case.displacements[run]) for run in range(len(case.runs))])
+    kept, groups = case.label != "mixed", betas.groups(3)
+    index = adjusted_rand_score(case.label[kept], groups[kept])
+    return table(["", *MODES, "mean"], [["error of the displacement, 10 betas, trained with all runs", *[f"{100 * errors[case.members(mode)].mean():.1f} %" for mode in MODES], f"{100 * errors[kept].mean():.1f} %"],
+                                        ["three k-means groups, adjusted Rand index", "", "", "", f"{index:.2f}"]])
+
+
+TABLES = {"unseen": unseen, "dimred": lasso, "dimred rebuilds": lasso_rebuilds}
