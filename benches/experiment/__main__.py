@@ -16,16 +16,18 @@ from functools import cached_property
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path += [os.path.join(HERE, os.pardir), os.path.join(HERE, os.pardir, "rotation_spectrum")]
 
+import curves
 import drawing
+import independent
+import isometry
 import pages
 import pictures
 import ranking
 import robustness
 import unseen
-import curves
 from cases import Case
 
-SECTIONS = [ranking, unseen, curves, robustness, pictures]
+SECTIONS = [ranking, independent, unseen, curves, robustness, isometry, pictures]
 
 
 def arguments():

@@ -6,6 +6,10 @@ sphere around the part.
 """
 
 import os
+import re
+import shutil
+import subprocess
+import sys
 import warnings
 from importlib.metadata import version
 
@@ -44,6 +48,20 @@ class Betas:
         return found
 
 
+def command_line(case, scratch, end="REDUCTION"):
+    """Runs the command `dimred` on a bundle up to a stage; runs and their betas of the last state, or the last line of what it
+    said where it fails."""
+    project = os.path.join(scratch, "dimred-" + end.lower())
+    shutil.rmtree(project, ignore_errors=True)
+    pattern = os.path.join(case.bundle.runs_folder, "run_*", "d3plot")
+    call = [sys.executable, "-m", "lasso.dimred.run", pattern, "--project-dir", project, "--end-stage", end, "--cluster-args", "KMeans", "n_clusters", "int", "3", "--n-processes", "2"]
+    done = subprocess.run(call, capture_output=True, text=True)
+    if done.returncode:
+        return done.stderr.strip().splitlines()[-1]
+    with h5py.File(os.path.join(project, "project_buffer.hdf5")) as file:
+        return list(file["betas"]), np.array([betas[-1] for betas in file["betas"].values()])
+
+
 def hash_similarities(case):
     """R x R: for each of x, y, z the field's curves along the first eigenvectors that are not constant; cosine of the curves
     by `curve_normalizer`'s integral, weighted by `get_mode_weights_inv`, mean of x, y, z.
@@ -74,16 +92,19 @@ def hashes_of_files(case, scratch):
     return hashing_sphere.compute_hashes(folder, n_files=1, ret_vals=True)
 
 
-def what_stops(case, run_file, scratch):
-    """Function, what it said: those that do not run here."""
+def what_stops(case, fine, scratch):
+    """Function, what it said: those that do not run here. `fine`: a case with nodes enough for the command line, or None."""
+    run_file = os.path.join(case.bundle.runs_folder, case.runs[0], "d3plot")
     x = np.linspace(0, 1, 5)
     tried = {
-        "`dimred` (command line), at `create_reference_subsample`": lambda: subsampling_methods.create_reference_subsample(run_file, []),
+        "`dimred` (command line) on the coarse mesh, at `create_reference_subsample`": lambda: subsampling_methods.create_reference_subsample(run_file, []),
         "`graph_laplacian.run_graph_laplacian`": lambda: graph_laplacian.run_graph_laplacian(case.rest),
         "the same, without its filter of warnings": lambda: graph_laplacian._laplacian(graph_laplacian._laplacian_gauss_idw(case.rest)),
         "`hashing.run_hash_comparison`, at `curve_normalizer`": lambda: hashing.curve_normalizer(x, x),
         "`hashing_sphere.compute_hashes`": lambda: hashes_of_files(case, scratch),
     }
+    if fine is not None:
+        tried["`dimred` on the fine mesh, last stage (the page)"] = lambda: command_line(fine, scratch, "EXPORT_PLOT")
     out = []
     for name, call in tried.items():
         try:
@@ -93,5 +114,7 @@ def what_stops(case, run_file, scratch):
             said = f'"{found}"' if isinstance(found, str) else "runs"
         except Exception as error:
             said = f"{type(error).__name__}: {error}"
+        # Not where things are installed.
+        said = re.sub(r"'/[^']*/(lasso/[^']*)'", r"'…/\1'", said)
         out.append([name, said.replace("|", "/")])
     return out
