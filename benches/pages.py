@@ -5,7 +5,7 @@ import re
 
 def table(head, rows, text=1):
     """A Markdown table; the first `text` columns hold words, the others numbers."""
-    line = lambda cells: "| " + " | ".join(map(str, cells)) + " |"
+    line = lambda cells: "| " + " | ".join(str(cell).replace("|", "\\|") for cell in cells) + " |"
     return "\n".join([line(head), line(["---"] * text + ["---:"] * (len(head) - text))] + [line(row) for row in rows])
 
 

@@ -16,7 +16,9 @@ from functools import cached_property
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path += [os.path.join(HERE, os.pardir), os.path.join(HERE, os.pardir, "rotation_spectrum")]
 
+import claims
 import curves
+import decks
 import drawing
 import independent
 import isometry
@@ -24,10 +26,11 @@ import pages
 import pictures
 import ranking
 import robustness
+import summary
 import unseen
 from cases import Case
 
-SECTIONS = [ranking, independent, unseen, curves, robustness, isometry, pictures]
+SECTIONS = [ranking, claims, independent, unseen, curves, robustness, isometry, decks, pictures, summary]
 
 
 def arguments():
@@ -46,7 +49,7 @@ class Bench:
     """The bundles, each taken through the program once, and what several tables need of them."""
 
     def __init__(self, options):
-        self.options = options
+        self.options, self.kept = options, {}  # kept: single numbers that the summary repeats, by name
         os.makedirs(options.scratch, exist_ok=True)
         runs, labels = os.path.join(options.example, "runs"), os.path.join(options.example, "labels.csv")
         self.cases = {"apart": Case(options, "apart", runs, labels), "joined": Case(options, "joined", runs, labels, "2.5")}

@@ -1,5 +1,6 @@
 """A bundle with its study, its labels and what the program says of it."""
 
+import csv
 import json
 import os
 import subprocess
@@ -17,9 +18,9 @@ SELECTS = ("coordinates", "difference")
 class Case:
     """Arrays over the last states of R runs; shapes are R x N x 3, coefficients R x K x 3."""
 
-    def __init__(self, options, name, runs, labels, join=None):
+    def __init__(self, options, name, runs, labels, join=None, *more):
         self.program, self.labels, self.scratch = options.program, labels, options.scratch
-        self.bundle = bundles.make(options.program, name, runs, labels, options.scratch, None, join)
+        self.bundle = bundles.make(options.program, name, runs, labels, options.scratch, None, join, more=more)
         self.name, self.runs, self.label = name, self.bundle.runs, self.bundle.label
         self.mass, self.rest, self.triangles = self.bundle.mass, self.bundle.vertices, self.bundle.triangles.astype(int)
         self.values = {"coordinates": self.bundle.delta + self.bundle.baseline, "difference": self.bundle.delta}
@@ -58,6 +59,13 @@ class Case:
         rows = self.compared["rows"] + self.compared["rotation"]
         (found,) = [row for row in rows if (row["label"], row["select"], row["method"]) == (mode, select, method)]
         return found
+
+    @cached_property
+    def fold_positions(self):
+        """Where each run folds, mm from the clamped end, by its labels."""
+        with open(self.labels, newline="") as file:
+            rows = {row["run"].removeprefix("run_").lstrip("0"): row for row in csv.DictReader(file)}
+        return np.array([float(rows[run.removeprefix("run_").lstrip("0")]["fold_position_mm"]) for run in self.runs])
 
     def members(self, mode):
         return np.flatnonzero(self.label == mode)

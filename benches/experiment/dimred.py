@@ -116,5 +116,5 @@ def what_stops(case, fine, scratch):
             said = f"{type(error).__name__}: {error}"
         # Not where things are installed.
         said = re.sub(r"'/[^']*/(lasso/[^']*)'", r"'…/\1'", said)
-        out.append([name, said.replace("|", "/")])
+        out.append([name, said])
     return out

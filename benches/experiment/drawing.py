@@ -21,12 +21,14 @@ plt.rcParams.update({"font.size": 9, "axes.spines.top": False, "axes.spines.righ
 
 
 def save(figure, folder, name):
-    """A PNG of at most 256 colours."""
+    """A PNG; of at most 256 colours where these do not have to pass into each other."""
     memory = io.BytesIO()
     figure.savefig(memory, format="png", bbox_inches="tight", pad_inches=0.08, facecolor="white")
+    graded = any(isinstance(drawn, PolyCollection) for axes in figure.axes for drawn in axes.collections)
     plt.close(figure)
     path = os.path.join(folder, name + ".png")
-    Image.open(memory).convert("RGB").quantize(256, dither=Image.Dither.NONE).save(path, optimize=True)
+    picture = Image.open(memory).convert("RGB")
+    (picture if graded else picture.quantize(256, dither=Image.Dither.NONE)).save(path, optimize=True)
     return path
 
 
@@ -61,7 +63,7 @@ def frame(axes, points, azimuth=-28, elevation=22, margin=8):
 
 def colour_bar(figure, axes, limit, label):
     scale = matplotlib.cm.ScalarMappable(matplotlib.colors.Normalize(-limit, limit), SHADES)
-    bar = figure.colorbar(scale, ax=axes, orientation="horizontal", fraction=0.035, pad=0.03, aspect=45)
+    bar = figure.colorbar(scale, ax=axes, orientation="horizontal", fraction=0.035, pad=0.03, aspect=50, shrink=0.5)
     bar.set_label(label)
 
 

@@ -88,8 +88,8 @@ def shifts(bench):
 
 def shift_table(bench):
     case, found, rows = bench.cases["apart"], shifts(bench), []
-    words = {"shift": "median of |λ′/λ − 1|, %", "largest": "largest of 48, %", "scale": "common factor s", "rest": "median of |λ′/sλ − 1|, %", "rest largest": "largest, %",
-             "span": "share of the span of 50", "shape": "error of 50 undeformed over 50 own"}
+    words = {"shift": "shift of eigenvalues 3 to 50: median, %", "largest": "largest, %", "scale": "common factor", "rest": "shift beside the factor: median, %", "rest largest": "largest beside it, %",
+             "span": "share of the span of 50 that is common", "shape": "error of 50 undeformed over that of 50 own"}
     for group in ("all", *MODES, "mixed"):
         of = np.ones(len(case.runs), bool) if group == "all" else case.label == group
         cells = []
@@ -123,7 +123,7 @@ def loss(bench):
                 found = [spearmanr(values[clear][of], target[of]) for of in (case.label[clear] == mode for mode in MODES)]
                 cells += [" / ".join(f"{one.statistic:+.2f}{'*' if one.pvalue < 0.05 else ''}" for one in found)]
             rows.append([what if place == 0 else "", name, *cells])
-    return table(["compared by", "strain measure", "ρ with 1 − similarity to the representative: crush / down / up", "ρ with the run's average precision as the query"], rows, 2)
+    return table(["compared by", "strain measure", "ρ with 1 − similarity to the representative", "ρ with the run's average precision as the query"], rows, 2)
 
 
 def own_metric(bench):
@@ -150,15 +150,15 @@ def picture(bench):
     case, found = bench.cases["apart"], shifts(bench)
     strain = 100 * last_measure(case, "strain_p95")
     similarity = rivals.descriptor(case.values["difference"])
-    figure, axes = plt.subplots(1, 3, figsize=(10.4, 3.4), layout="constrained")
-    panels = [(100 * found["shift"], "eigenvalue shift, median of 48, %"), (found["span"], "share of the span of 50 eigenvectors"),
+    figure, axes = plt.subplots(1, 3, figsize=(10.4, 3.6), layout="constrained")
+    panels = [(100 * found["shift"], "shift of eigenvalues 3 to 50, median, %"), (found["span"], "share of the span of 50 eigenvectors"),
               (np.array([average_precision(case.label[ranked(similarity(run), run)] == label) if label != "mixed" else np.nan for run, label in enumerate(case.label)]), "average precision of the run\nas the query, differences")]
     for panel, (values, words) in zip(axes, panels):
         for label in COLOUR:
             of = case.label == label
             panel.plot(strain[of], values[of], MARK[label], color=COLOUR[label], ms=4)
         panel.set(xlabel="edge strain, 95 % quantile, %", ylabel=words)
-    legend_of_labels(axes[0], loc="best", fontsize=8)
+    legend_of_labels(axes[1], loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4, fontsize=8)
     return figure
 
 

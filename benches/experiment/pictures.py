@@ -32,14 +32,13 @@ def cloud(bench):
         points = right.scatter(x, z, c=np.round(time), s=11, cmap="viridis")
         for panel, colour in ((left, "label; lines: states of a run"), (right, "time")):
             panel.set(xlabel=f"$\\alpha^x_{row + 1}$, 1000 mm²", ylabel=f"$\\alpha^z_{row + 1}$, 1000 mm²", title=f"eigenvector {row + 1}, by {colour}")
-    legend_of_labels(axes[0, 0], loc="upper left", ncols=2, fontsize=8)
+    legend_of_labels(axes[1, 0], loc="upper left", ncols=1, fontsize=8)
     figure.colorbar(points, ax=axes[:, 1], label="time, ms", ticks=np.unique(np.round(time)), fraction=0.05)
     return figure
 
 
-def rebuilt(bench):
-    case = bench.cases["apart"]
-    figure, axes = plt.subplots(4, 3, figsize=(9.6, 8.2), layout="constrained")
+def rebuilt(case):
+    figure, axes = plt.subplots(4, 3, figsize=(9.6, 7.2), layout="constrained")
     rows = {}
     for mode in MODES:
         run = case.runs[case.queries[mode]]
@@ -101,4 +100,4 @@ def nearest(bench):
     return figure
 
 
-PICTURES = {"experiment-cloud": cloud, "experiment-rebuilt": rebuilt, "experiment-similarity": similarity, "experiment-nearest": nearest}
+PICTURES = {"experiment-cloud": cloud, "experiment-rebuilt": lambda bench: rebuilt(bench.cases["apart"]), "experiment-rebuilt-joined": lambda bench: rebuilt(bench.cases["joined"]), "experiment-similarity": similarity, "experiment-nearest": nearest}

@@ -68,6 +68,7 @@ def ranking(bench):
         means = by_mode(similarity_of, case)
         cells = [judged(similarity_of(case.queries[mode]), case.queries[mode], case.label) for mode in MODES]
         each = lambda place, digits: " / ".join(f"{cell[place]:.{digits}f}" for cell in cells)
+        bench.kept["ranking", name.replace("**", "")] = np.mean(list(means.values()))
         counts = list(numbers.values())
         rows.append([name, str(counts[0]) if len(set(counts)) == 1 else " / ".join(map(str, counts)), each(0, 2), each(1, 3), each(2, 3),
                      " / ".join(f"{means[mode]:.3f}" for mode in MODES), f"{np.mean(list(means.values())):.3f}"])
@@ -90,7 +91,8 @@ def confusion(bench):
             right = "" if label == "mixed" else f"{(best[of] == MODES.index(label)).mean():.2f}"
             rows.append([words if label == MODES[0] else "", label, *[int((best[of] == column).sum()) for column in range(3)], right])
         of = others & (case.label != "mixed")
-        rows.append(["", "all three", "", "", "", f"{np.mean([MODES[k] == label for k, label in zip(best[of], case.label[of])]):.2f}"])
+        bench.kept["confusion", words] = np.mean([MODES[k] == label for k, label in zip(best[of], case.label[of])])
+        rows.append(["", "all three", "", "", "", f"{bench.kept['confusion', words]:.2f}"])
     return table(["compared by", "label \\ nearest descriptor", *MODES, "right"], rows, 2)
 
 
@@ -120,7 +122,8 @@ def cloud_separates(bench):
         points, label = points[kept], case.label[kept]
         distance = np.linalg.norm(points[:, None] - points[None], axis=2) + np.diag(np.full(len(points), np.inf))
         groups = KMeans(3, n_init=20, random_state=1).fit_predict(points)
-        rows.append([words, f"{(label[distance.argmin(1)] == label).mean():.2f}", f"{adjusted_rand_score(label, groups):.2f}"])
+        bench.kept["cloud", words] = (label[distance.argmin(1)] == label).mean()
+        rows.append([words, f"{bench.kept['cloud', words]:.2f}", f"{adjusted_rand_score(label, groups):.2f}"])
     return table(["coefficients", "nearest run has the same label", "three k-means groups, adjusted Rand index"], rows)
 
 

@@ -192,8 +192,8 @@ def representatives_picture(bench):
             axes.plot([place + offset - 0.1, place + offset + 0.1], [np.median(values)] * 2, color=COLOUR[mode], lw=2)
             chance = np.mean(case.label == mode)
             axes.plot([place + offset - 0.1, place + offset + 0.1], [chance] * 2, color="#888888", lw=0.8)
-    axes.set(xticks=range(len(SHOWN)), xticklabels=[name.replace(", ", ",\n").replace("M hand", "M hand") for name in SHOWN], ylabel="average precision", ylim=(0.25, 1.02))
-    axes.legend(loc="lower right", fontsize=8, title="dot: a representative; bar: median; grey: chance", title_fontsize=8)
+    axes.set(xticks=range(len(SHOWN)), xticklabels=[name.replace(", ", ",\n").replace("M hand-picked ", "M hand-picked\n").replace("rotation ", "rotation\n") for name in SHOWN], ylabel="average precision", ylim=(0.25, 1.02))
+    axes.legend(loc="upper left", bbox_to_anchor=(1, 1), fontsize=8, title="dot: a representative\nbar: median\ngrey: chance", title_fontsize=8)
     return figure
 
 

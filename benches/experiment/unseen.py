@@ -4,8 +4,6 @@ A set of runs is taken out; each of them is then rebuilt and is the query of a r
 very run; *each left out*, all others of its kind; *unseen*, none of its kind (mixed runs, which are half of one kind, are out as well).
 """
 
-import csv
-
 import dimred
 import numpy as np
 import rivals
@@ -27,19 +25,11 @@ def spectral_errors(case, runs, count_of, sort):
     return np.array(out)
 
 
-def folds_at_the_hit_end(case):
-    """Clear crush runs whose folds lie beyond the middle of the beam (labels.csv)."""
-    with open(case.labels, newline="") as file:
-        rows = {row["run"]: row for row in csv.DictReader(file)}
-    beyond = [float(rows[run]["fold_position_mm"]) > case.rest[:, 0].max() / 2 for run in case.runs]
-    return np.flatnonzero((case.label == "crush") & case.bundle.clear & np.array(beyond))
-
-
 def unseen(bench):
     case, rows = bench.cases["apart"], []
     everything, size = np.arange(len(case.runs)), lambda run: rivals.size_of(case, run)
     kinds = {mode: (case.members(mode), np.flatnonzero((case.label != mode) & (case.label != "mixed"))) for mode in MODES}
-    hit = folds_at_the_hit_end(case)
+    hit = np.flatnonzero((case.label == "crush") & case.bundle.clear & (case.fold_positions > case.rest[:, 0].max() / 2))
     kinds["crush at the hit end"] = hit, np.setdiff1d(everything, hit)
     for kind, (runs, others) in kinds.items():
         whole = case.rms(case.displacements[runs])
@@ -54,6 +44,7 @@ def unseen(bench):
                 of = (lambda run: alone[run]) if words == "each left out" else (lambda run: trained[words])
                 errors = np.array([at(of(run).errors([run])[0], run) for run in runs])
                 found.append((f"PCA, {words}", numbers, errors, ranks(lambda run: rivals.components(case, of(run), share)(run))))
+        bench.kept |= {("unseen", kind, method, numbers): (errors / whole).mean() for method, numbers, errors, _ in found}
         rows += [[f"{kind} ({len(runs)} runs)" if method == "descriptor" else "", method, numbers, f"{errors.mean():.1f}", f"{100 * (errors / whole).mean():.1f} %", f"{100 * (errors / whole).max():.1f} %", rank]
                  for method, numbers, errors, rank in found]
     return table(["runs", "rebuilt from", "numbers", "mean error, mm", "of the displacement", "worst run", "mean AP"], rows, 3)

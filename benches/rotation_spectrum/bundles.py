@@ -51,12 +51,12 @@ def crumple(program, *arguments):
     subprocess.run([program, "--quiet", *map(str, arguments)], check=True, stdout=subprocess.DEVNULL)
 
 
-def make(program, name, runs_folder, labels, scratch, fold, join=None, eigenpairs=500):
-    """The study of all runs of a folder, made anew, and read."""
+def make(program, name, runs_folder, labels, scratch, fold, join=None, eigenpairs=500, more=()):
+    """The study of all runs of a folder, made anew, and read; `more`: further words for `init`."""
     study = os.path.join(scratch, name.replace(", ", "-").replace(" ", "-"))
     subprocess.run(["rm", "-rf", study, study + "-arrays"], check=True)
     reference = sorted(glob.glob(os.path.join(runs_folder, "run_*")))[0]
-    options = ["-K", eigenpairs] + (["--join", join] if join else [])
+    options = ["-K", eigenpairs] + (["--join", join] if join else []) + list(more)
     crumple(program, "init", study, "--reference", reference, *options)
     crumple(program, "add", study, runs_folder)
     crumple(program, "export", study, "-o", study + "-arrays", "--format", "parquet", "--last")
