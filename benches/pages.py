@@ -11,9 +11,12 @@ def table(head, rows, text=1):
 
 def write(path, made):
     """Puts tables between their marks on a page."""
-    page = open(path).read()
+    with open(path) as file:
+        page = file.read()
     for name, text in made.items():
-        page, found = re.subn(f"(<!-- table: {re.escape(name)} -->\n).*?(<!-- end -->)", lambda match: f"{match[1]}\n{text}\n\n{match[2]}", page, flags=re.S)
+        page, found = re.subn(
+            f"(<!-- table: {re.escape(name)} -->\n).*?(<!-- end -->)", lambda match: f"{match[1]}\n{text}\n\n{match[2]}", page, flags=re.S
+        )
         if not found:
             print(f"{path} has no place for the table '{name}'")
     with open(path, "w") as file:

@@ -13,6 +13,9 @@ import sys
 import time
 from functools import cached_property
 
+# Small matrices: more threads of the linear algebra cost more than they give where other work goes on.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path += [os.path.join(HERE, os.pardir), os.path.join(HERE, os.pardir, "rotation_spectrum")]
 
@@ -28,9 +31,10 @@ import ranking
 import robustness
 import summary
 import unseen
+import uses
 from cases import Case
 
-SECTIONS = [ranking, claims, independent, unseen, curves, robustness, isometry, decks, pictures, summary]
+SECTIONS = [ranking, claims, independent, unseen, curves, robustness, isometry, decks, uses, pictures, summary]
 
 
 def arguments():
@@ -55,7 +59,10 @@ class Bench:
         self.cases = {"apart": Case(options, "apart", runs, labels), "joined": Case(options, "joined", runs, labels, "2.5")}
         if os.path.isdir(options.fine):
             labels = os.path.join(options.fine, "labels.csv")
-            self.cases |= {"fine": Case(options, "fine", options.fine, labels), "fine, joined": Case(options, "fine, joined", options.fine, labels, "2.5")}
+            self.cases |= {
+                "fine": Case(options, "fine", options.fine, labels),
+                "fine, joined": Case(options, "fine, joined", options.fine, labels, "2.5"),
+            }
         else:
             print(f"left out: the fine bundle, which is not at {options.fine}\n")
 

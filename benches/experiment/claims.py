@@ -14,7 +14,12 @@ def letter(bench):
     for name in [name for name in ("apart", "joined", "fine", "fine, joined") if name in bench.cases]:
         case = bench.cases[name]
         plain = Case(bench.options, f"{name}, plain", case.bundle.runs_folder, case.labels, "2.5" if "joined" in name else None, "--mass", "identity")
-        for words, study, options in (("as the program does it: |α| > t, lumped mass", case, []), ("α > t", case, ["--signed"]), ("M = I", plain, []), ("both: to the letter", plain, ["--signed"])):
+        for words, study, options in (
+            ("as the program does it: |α| > t, lumped mass", case, []),
+            ("α > t", case, ["--signed"]),
+            ("M = I", plain, []),
+            ("both: to the letter", plain, ["--signed"]),
+        ):
             found = []
             for mode in MODES:
                 query = case.queries[mode]
@@ -35,15 +40,33 @@ def place(bench):
         apart = np.abs(where[runs][:, None] - where[runs])
         pairs = ~np.eye(len(runs), dtype=bool)
         far = np.mean(apart[pairs])
-        for words, similarity in (("coordinates", rivals.descriptor(case.values["coordinates"])), ("differences", rivals.descriptor(case.values["difference"])), ("rotation spectrum", rivals.rotation(case))):
+        for words, similarity in (
+            ("coordinates", rivals.descriptor(case.values["coordinates"])),
+            ("differences", rivals.descriptor(case.values["difference"])),
+            ("rotation spectrum", rivals.rotation(case)),
+        ):
             matrix = np.array([similarity(run) for run in runs])
             rho = spearmanr(matrix[:, runs][pairs], apart[pairs]).statistic
             bench.kept["place", name, words] = rho
             near = [ranked(row, run)[:NEAREST] for row, run in zip(matrix, runs)]
             crush = np.mean([(case.label[found] == "crush").mean() for found in near])
             distance = np.mean(np.concatenate([np.abs(where[found[case.label[found] == "crush"]] - where[run]) for found, run in zip(near, runs)]))
-            rows.append([f"{name}, {len(runs)} clear crush runs" if words == "coordinates" else "", words, f"{rho:+.2f}", f"{crush:.2f}", f"{distance:.0f} mm of {far:.0f} mm"])
-    head = ["beam", "compared by", "ρ of similarity and distance of the folds, all pairs", "crush among the nine nearest, mean query", "distance of the folds of those, of all pairs"]
+            rows.append(
+                [
+                    f"{name}, {len(runs)} clear crush runs" if words == "coordinates" else "",
+                    words,
+                    f"{rho:+.2f}",
+                    f"{crush:.2f}",
+                    f"{distance:.0f} mm of {far:.0f} mm",
+                ]
+            )
+    head = [
+        "beam",
+        "compared by",
+        "ρ of similarity and distance of the folds, all pairs",
+        "crush among the nine nearest, mean query",
+        "distance of the folds of those, of all pairs",
+    ]
     return table(head, rows, 2)
 
 

@@ -57,7 +57,9 @@ def components(case, without):
 def found(bench):
     case = bench.cases["apart"]
     if not hasattr(bench, "curves"):
-        bench.curves = {(select, method): spectral(case, select, method == "descriptor") for select in SELECTS for method in ("descriptor", "first M")}
+        bench.curves = {
+            (select, method): spectral(case, select, method == "descriptor") for select in SELECTS for method in ("descriptor", "first M")
+        }
         bench.curves |= {("difference", "PCA"): components(case, False), ("difference", "PCA, mode unseen"): components(case, True)}
     return bench.curves
 
@@ -91,11 +93,16 @@ def curves_picture(bench):
             values = mean(curve, row)
             style = {"descriptor": "-", "first M": "--"}.get(method, "-.")
             axes[row, column].plot(own * (np.arange(len(values)) + 1), values, color=METHOD[method], lw=1.8, ls=style, label=method)
-    turned, at = np.mean([row["mean_average_precision"] for row in bench.cases["apart"].compared["rotation"]]), bench.cases["apart"].compared["rotation"][0]["size"]
+    turned, at = (
+        np.mean([row["mean_average_precision"] for row in bench.cases["apart"].compared["rotation"]]),
+        bench.cases["apart"].compared["rotation"][0]["size"],
+    )
     for column, words in enumerate(("coordinates", "differences")):
         axes[0, column].set(title=words, yscale="log", ylabel="RMS error, mm", ylim=(0.7, 200))
         axes[1, column].plot(at, turned, "D", ms=5, color=METHOD["rotation spectrum"], label="rotation spectrum")
-        axes[1, column].set(xscale="log", xlabel="numbers kept (3 an eigenvector, 1 a component)", ylabel="average precision, mean over queries", ylim=(0.3, 1))
+        axes[1, column].set(
+            xscale="log", xlabel="numbers kept (3 an eigenvector, 1 a component)", ylabel="average precision, mean over queries", ylim=(0.3, 1)
+        )
     axes[0, 0].legend(loc="lower left", fontsize=8)
     axes[0, 1].legend(loc="lower left", fontsize=8)
     axes[1, 1].legend(*[found[-1:] for found in axes[1, 1].get_legend_handles_labels()], loc="lower right", fontsize=8)

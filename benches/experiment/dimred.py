@@ -54,7 +54,23 @@ def command_line(case, scratch, end="REDUCTION"):
     project = os.path.join(scratch, "dimred-" + end.lower())
     shutil.rmtree(project, ignore_errors=True)
     pattern = os.path.join(case.bundle.runs_folder, "run_*", "d3plot")
-    call = [sys.executable, "-m", "lasso.dimred.run", pattern, "--project-dir", project, "--end-stage", end, "--cluster-args", "KMeans", "n_clusters", "int", "3", "--n-processes", "2"]
+    call = [
+        sys.executable,
+        "-m",
+        "lasso.dimred.run",
+        pattern,
+        "--project-dir",
+        project,
+        "--end-stage",
+        end,
+        "--cluster-args",
+        "KMeans",
+        "n_clusters",
+        "int",
+        "3",
+        "--n-processes",
+        "2",
+    ]
     done = subprocess.run(call, capture_output=True, text=True)
     if done.returncode:
         return done.stderr.strip().splitlines()[-1]
@@ -70,17 +86,19 @@ def hash_similarities(case):
     or turned."""
     positive = np.flatnonzero(case.bundle.eigenvalues > 1e-9 * case.bundle.eigenvalues[-1])[:HASH_MODES]
     vectors, weights = case.bundle.eigenvectors[positive].T, hashing.get_mode_weights_inv(case.bundle.eigenvalues[positive])
-    curves = np.array([[[y for _, y in hashing.compute_hashes(vectors, run[:, axis], HASH_POINTS)] for axis in range(3)] for run in case.displacements])
+    curves = np.array(
+        [[[y for _, y in hashing.compute_hashes(vectors, run[:, axis], HASH_POINTS)] for axis in range(3)] for run in case.displacements]
+    )
     curves = curves / np.maximum(np.linalg.norm(curves, axis=-1, keepdims=True), 1e-300)  # R x 3 x modes x points
     return np.einsum("racp,sacp,c->rs", curves, curves, weights) / 3
 
 
 def sphere_similarities(case):
-    """R x R: x, y and z of the displacement on the sphere around the undeformed part, their hashes end to end."""
+    """R x R, and how many numbers: x, y and z of the displacement on the sphere around the undeformed part, their hashes end to end."""
     histogram = sphere.create_histogram(case.rest)
     hashes = np.array([np.concatenate([sphere.sphere_hashing(histogram, run[:, axis]) for axis in range(3)]) for run in case.displacements])
     hashes = hashes[:, np.any(hashes != 0, axis=0)]
-    return np.array([cosine(hashes, row) for row in hashes])
+    return np.array([cosine(hashes, row) for row in hashes]), hashes.shape[1]
 
 
 def hashes_of_files(case, scratch):
@@ -97,7 +115,9 @@ def what_stops(case, fine, scratch):
     run_file = os.path.join(case.bundle.runs_folder, case.runs[0], "d3plot")
     x = np.linspace(0, 1, 5)
     tried = {
-        "`dimred` (command line) on the coarse mesh, at `create_reference_subsample`": lambda: subsampling_methods.create_reference_subsample(run_file, []),
+        "`dimred` (command line) on the coarse mesh, at `create_reference_subsample`": lambda: subsampling_methods.create_reference_subsample(
+            run_file, []
+        ),
         "`graph_laplacian.run_graph_laplacian`": lambda: graph_laplacian.run_graph_laplacian(case.rest),
         "the same, without its filter of warnings": lambda: graph_laplacian._laplacian(graph_laplacian._laplacian_gauss_idw(case.rest)),
         "`hashing.run_hash_comparison`, at `curve_normalizer`": lambda: hashing.curve_normalizer(x, x),

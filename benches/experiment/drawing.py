@@ -14,10 +14,19 @@ from PIL import Image
 # Okabe and Ito 2008.
 COLOUR = {"crush": "#0072B2", "down": "#D55E00", "up": "#009E73", "mixed": "#8a8a8a"}
 MARK = {"crush": "o", "down": "v", "up": "^", "mixed": "x"}
-METHOD = {"descriptor": "#0072B2", "first M": "#D55E00", "PCA": "#009E73", "PCA, mode unseen": "#CC79A7", "first 500": "#8a8a8a", "rotation spectrum": "#000000"}
+METHOD = {
+    "descriptor": "#0072B2",
+    "first M": "#D55E00",
+    "PCA": "#009E73",
+    "PCA, mode unseen": "#CC79A7",
+    "first 500": "#8a8a8a",
+    "rotation spectrum": "#000000",
+}
 SHADES = "RdBu_r"
 
-plt.rcParams.update({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.titlesize": 9.5, "legend.frameon": False, "savefig.dpi": 110})
+plt.rcParams.update(
+    {"font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.titlesize": 9.5, "legend.frameon": False, "savefig.dpi": 110}
+)
 
 
 def save(figure, folder, name):

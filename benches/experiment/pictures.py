@@ -31,7 +31,9 @@ def cloud(bench):
             left.plot(x[of][-1:], z[of][-1:], MARK[label[name]], ms=4.5, color=COLOUR[label[name]])
         points = right.scatter(x, z, c=np.round(time), s=11, cmap="viridis")
         for panel, colour in ((left, "label; lines: states of a run"), (right, "time")):
-            panel.set(xlabel=f"$\\alpha^x_{row + 1}$, 1000 mm²", ylabel=f"$\\alpha^z_{row + 1}$, 1000 mm²", title=f"eigenvector {row + 1}, by {colour}")
+            panel.set(
+                xlabel=f"$\\alpha^x_{row + 1}$, 1000 mm²", ylabel=f"$\\alpha^z_{row + 1}$, 1000 mm²", title=f"eigenvector {row + 1}, by {colour}"
+            )
     legend_of_labels(axes[1, 0], loc="upper left", ncols=1, fontsize=8)
     figure.colorbar(points, ax=axes[:, 1], label="time, ms", ticks=np.unique(np.round(time)), fraction=0.05)
     return figure
@@ -94,10 +96,21 @@ def nearest(bench):
             draw(panel, case.shapes[run], case.triangles, case.shapes[run][:, 2] - case.rest[:, 2], limit)
             frame(panel, everything)
             right = case.label[run] == "crush"
-            panel.set_title(f"{place + 1}: {case.runs[run]}, {case.label[run]}", fontsize=8, color="black" if right else COLOUR["down"], fontweight="normal" if right else "bold")
+            panel.set_title(
+                f"{place + 1}: {case.runs[run]}, {case.label[run]}",
+                fontsize=8,
+                color="black" if right else COLOUR["down"],
+                fontweight="normal" if right else "bold",
+            )
         figure.text(0.25 + 0.5 * block, 1.01, words, ha="center", fontsize=9.5)
     colour_bar(figure, axes, limit, "displacement in z, mm")
     return figure
 
 
-PICTURES = {"experiment-cloud": cloud, "experiment-rebuilt": lambda bench: rebuilt(bench.cases["apart"]), "experiment-rebuilt-joined": lambda bench: rebuilt(bench.cases["joined"]), "experiment-similarity": similarity, "experiment-nearest": nearest}
+PICTURES = {
+    "experiment-cloud": cloud,
+    "experiment-rebuilt": lambda bench: rebuilt(bench.cases["apart"]),
+    "experiment-rebuilt-joined": lambda bench: rebuilt(bench.cases["joined"]),
+    "experiment-similarity": similarity,
+    "experiment-nearest": nearest,
+}

@@ -27,15 +27,43 @@ def sizes(bench):
             kept = [case.row(mode, select, "first M") for select in SELECTS]
             every = case.row(mode, "coordinates", "first 500")
             cells = [f"{row['rms']:.1f} ({100 * row['relative']:.0f} %)" for pair in zip(found, kept) for row in pair]
-            rows.append([name if mode == MODES[0] else "", mode, found[0]["query"], len(case.rest), found[0]["size"], *cells[:2], f"{every['rms']:.1f}", found[1]["size"], *cells[2:]])
-    head = ["beam", "mode", "representative", "N", "M, coordinates", "descriptor, mm", "first M, mm", "first 500, mm", "M, differences", "descriptor, mm", "first M, mm"]
+            rows.append(
+                [
+                    name if mode == MODES[0] else "",
+                    mode,
+                    found[0]["query"],
+                    len(case.rest),
+                    found[0]["size"],
+                    *cells[:2],
+                    f"{every['rms']:.1f}",
+                    found[1]["size"],
+                    *cells[2:],
+                ]
+            )
+    head = [
+        "beam",
+        "mode",
+        "representative",
+        "N",
+        "M, coordinates",
+        "descriptor, mm",
+        "first M, mm",
+        "first 500, mm",
+        "M, differences",
+        "descriptor, mm",
+        "first M, mm",
+    ]
     return table(head, rows, 3)
 
 
 def nearest(bench):
     case, rows = bench.cases["apart"], []
     for mode in MODES:
-        found = {"coordinates": case.row(mode, "coordinates", "descriptor"), "differences": case.row(mode, "difference", "descriptor"), "rotation": case.row(mode, "rotation", "rotation spectrum")}
+        found = {
+            "coordinates": case.row(mode, "coordinates", "descriptor"),
+            "differences": case.row(mode, "difference", "descriptor"),
+            "rotation": case.row(mode, "rotation", "rotation spectrum"),
+        }
         for words, row in found.items():
             label = lambda run: case.label[case.runs.index(run)]
             cells = [run.removeprefix("run_") + ("" if label(run) == mode else f" **({label(run)})**") for run in row["nearest"]]
@@ -49,16 +77,23 @@ def methods(case):
     every = rivals.Pca(case, np.arange(len(case.runs)))
     times = lambda factor, select="difference": {mode: factor * count for mode, count in size[select].items()}
     same = lambda count: dict.fromkeys(MODES, count)
-    betas, hashes, spheres = dimred.Betas(case), dimred.hash_similarities(case), dimred.sphere_similarities(case)
+    betas, hashes, (spheres, cells) = dimred.Betas(case), dimred.hash_similarities(case), dimred.sphere_similarities(case)
     out = []
     for select in SELECTS:
         words = {"coordinates": "coordinates", "difference": "differences"}[select]
-        out += [(f"**descriptor**, {words}", times(3, select), rivals.descriptor(case.values[select])), (f"first M, {words}", times(3, select), rivals.first(case.values[select])),
-                (f"first 500, {words}", same(1500), rivals.first(case.values[select], 500))]
+        out += [
+            (f"**descriptor**, {words}", times(3, select), rivals.descriptor(case.values[select])),
+            (f"first M, {words}", times(3, select), rivals.first(case.values[select])),
+            (f"first 500, {words}", same(1500), rivals.first(case.values[select], 500)),
+        ]
     out += [("PCA, M components", times(1), rivals.components(case, every)), ("PCA, 3M components", times(3), rivals.components(case, every, 3))]
-    out += [("M hand-picked nodes", times(3), rivals.hand_picked(case)), ("dimred: betas", same(betas.betas.shape[1]), rivals.of_rows(betas.betas)),
-            ("dimred: hashes", same(3 * dimred.HASH_MODES * dimred.HASH_POINTS), lambda query: hashes[query]), ("dimred: sphere", same("–"), lambda query: spheres[query]),
-            ("**rotation spectrum**", same(case.row("crush", "rotation", "rotation spectrum")["size"]), rivals.rotation(case))]
+    out += [
+        ("M hand-picked nodes", times(3), rivals.hand_picked(case)),
+        ("dimred: betas", same(betas.betas.shape[1]), rivals.of_rows(betas.betas)),
+        ("dimred: hashes", same(3 * dimred.HASH_MODES * dimred.HASH_POINTS), lambda query: hashes[query]),
+        ("dimred: sphere", same(cells), lambda query: spheres[query]),
+        ("**rotation spectrum**", same(case.row("crush", "rotation", "rotation spectrum")["size"]), rivals.rotation(case)),
+    ]
     return out
 
 
@@ -70,15 +105,28 @@ def ranking(bench):
         each = lambda place, digits: " / ".join(f"{cell[place]:.{digits}f}" for cell in cells)
         bench.kept["ranking", name.replace("**", "")] = np.mean(list(means.values()))
         counts = list(numbers.values())
-        rows.append([name, str(counts[0]) if len(set(counts)) == 1 else " / ".join(map(str, counts)), each(0, 2), each(1, 3), each(2, 3),
-                     " / ".join(f"{means[mode]:.3f}" for mode in MODES), f"{np.mean(list(means.values())):.3f}"])
+        rows.append(
+            [
+                name,
+                str(counts[0]) if len(set(counts)) == 1 else " / ".join(map(str, counts)),
+                each(0, 2),
+                each(1, 3),
+                each(2, 3),
+                " / ".join(f"{means[mode]:.3f}" for mode in MODES),
+                f"{np.mean(list(means.values())):.3f}",
+            ]
+        )
     return table(["compared by", "numbers", "precision at 9", "average precision", "ROC area", "mean AP, every run the query", "mean"], rows)
 
 
 def confusion(bench):
     """Each run to the mode whose representative's descriptor it is most similar to, by `crumple search`."""
     case, rows = bench.cases["apart"], []
-    for words, select, kind in (("coordinates", "coordinates", "paper"), ("differences", "difference", "paper"), ("rotation spectrum", "coordinates", "rotation")):
+    for words, select, kind in (
+        ("coordinates", "coordinates", "paper"),
+        ("differences", "difference", "paper"),
+        ("rotation spectrum", "coordinates", "rotation"),
+    ):
         found = []
         for mode in MODES:
             name = f"confusion-{mode}"
@@ -105,7 +153,20 @@ def modes_found(bench):
         for case in bench.beams.values():
             of = {found["chosen"]: found for found in case.compared["modes"] if (found["by"], found["method"]) == (by, method)}
             cells += [f"{of[False]['ari']:.2f}" if False in of else "–", f"{of[True]['count']}: {of[True]['ari']:.2f}" if True in of else "–"]
-        rows.append([by + (", the default" if (by, method) == ("rotation", "kmeans") else ", the paper's" if (by, method) == ("displacement", "kmeans") else ""), method, *cells])
+        rows.append(
+            [
+                by
+                + (
+                    ", the default"
+                    if (by, method) == ("rotation", "kmeans")
+                    else ", the paper's"
+                    if (by, method) == ("displacement", "kmeans")
+                    else ""
+                ),
+                method,
+                *cells,
+            ]
+        )
     head = [words for name in bench.beams for words in (f"{name}: 3 given", "chosen")]
     return table(["runs alike by", "method", *head], rows, 2)
 
@@ -117,8 +178,12 @@ def cloud_separates(bench):
 
     case, rows = bench.cases["joined"], []
     kept = case.label != "mixed"
-    for words, points in (("eigenvector 1", case.values["coordinates"][:, 0]), ("eigenvector 2", case.values["coordinates"][:, 1]), ("both", case.values["coordinates"][:, :2].reshape(len(case.runs), -1)),
-                          ("all 500", case.values["coordinates"].reshape(len(case.runs), -1))):
+    for words, points in (
+        ("eigenvector 1", case.values["coordinates"][:, 0]),
+        ("eigenvector 2", case.values["coordinates"][:, 1]),
+        ("both", case.values["coordinates"][:, :2].reshape(len(case.runs), -1)),
+        ("all 500", case.values["coordinates"].reshape(len(case.runs), -1)),
+    ):
         points, label = points[kept], case.label[kept]
         distance = np.linalg.norm(points[:, None] - points[None], axis=2) + np.diag(np.full(len(points), np.inf))
         groups = KMeans(3, n_init=20, random_state=1).fit_predict(points)

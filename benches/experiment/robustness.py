@@ -9,7 +9,7 @@ from cases import MODES, SELECTS
 from drawing import COLOUR
 from judge import average_precision
 from pages import table
-from quality import by_mode, cosine, judged, ranked
+from quality import by_mode, judged, ranked
 from scipy.stats import spearmanr
 from sklearn.metrics import adjusted_rand_score
 
@@ -21,7 +21,10 @@ def outcome(case, values):
     """Of the paper's descriptor on coefficients R x K x 3, by mode: M, average precision of the representative, mean over all runs."""
     similarity = rivals.descriptor(values)
     means = by_mode(similarity, case)
-    return {mode: (len(select(values[case.queries[mode]])), judged(similarity(case.queries[mode]), case.queries[mode], case.label)[1], means[mode]) for mode in MODES}
+    return {
+        mode: (len(select(values[case.queries[mode]])), judged(similarity(case.queries[mode]), case.queries[mode], case.label)[1], means[mode])
+        for mode in MODES
+    }
 
 
 def cells(found):
@@ -34,7 +37,7 @@ def cells(found):
             low, high = (function(one[mode][place] for one in found) for function in (min, max))
             text = [f"{value:.{digits}f}" for value in (low, high)]
             words.append(text[0] if text[0] == text[1] else "…".join(text))
-        out.append(" / ".join(words))
+        out.append(words[0] if len(set(words)) == 1 and place == 0 else " / ".join(words))
     return out
 
 
@@ -96,7 +99,12 @@ def noise(bench):
                     points = spectra.spectrum(case.bundle, np.array([rho for rho, _ in fields]), np.array([energy for _, energy in fields]))
                     similarity, before = rivals.of_rows(points), clean @ clean.T
                     means = by_mode(similarity, case)
-                    found.append({mode: (points.shape[1], judged(similarity(case.queries[mode]), case.queries[mode], case.label)[1], means[mode]) for mode in MODES})
+                    found.append(
+                        {
+                            mode: (points.shape[1], judged(similarity(case.queries[mode]), case.queries[mode], case.label)[1], means[mode])
+                            for mode in MODES
+                        }
+                    )
                     moved.append(np.abs(points @ points.T - before).max())
                 else:
                     values = case.values[what] + np.einsum("kn,rnc->rkc", weighted, shift)
@@ -116,11 +124,28 @@ def moments(bench):
         time = states.time.to_numpy()[at].mean()
         deltas = case.bundle.delta_states[at]
         for by in SELECTS:
-            rows.append([f"{time:.0f} ms" if by == "coordinates" else "", WORDS[by], *cells(outcome(case, deltas + (case.bundle.baseline if by == "coordinates" else 0)))])
+            rows.append(
+                [
+                    f"{time:.0f} ms" if by == "coordinates" else "",
+                    WORDS[by],
+                    *cells(outcome(case, deltas + (case.bundle.baseline if by == "coordinates" else 0))),
+                ]
+            )
         points = spectra.spectrum(case.bundle, case.bundle.rho_states[at], case.bundle.energy_states[at])
         similarity = rivals.of_rows(points)
         means = by_mode(similarity, case)
-        rows.append(["", "rotation spectrum", *cells({mode: (points.shape[1], judged(similarity(case.queries[mode]), case.queries[mode], case.label)[1], means[mode]) for mode in MODES})])
+        rows.append(
+            [
+                "",
+                "rotation spectrum",
+                *cells(
+                    {
+                        mode: (points.shape[1], judged(similarity(case.queries[mode]), case.queries[mode], case.label)[1], means[mode])
+                        for mode in MODES
+                    }
+                ),
+            ]
+        )
     return table(["state", "compared by", "M, or numbers", "AP", "mean AP"], rows, 2)
 
 
@@ -145,8 +170,29 @@ def meshes(bench):
             means = [np.mean([average_precision(ends[ranked(row, query)] == ends[query]) for query, row in enumerate(matrix)]) for matrix in matrices]
             agree = spearmanr(matrices[0][off], matrices[1][off]).statistic
             size = lambda found: f"{np.median(found):.0f} ({found.min()}…{found.max()})" if what in SELECTS else "–"
-            rows.append([f"{names[0]} / {names[1]}, {len(both)} runs" if what == "coordinates" else "", WORDS.get(what, "rotation spectrum"), size(sizes[0]), size(sizes[1]), *[f"{mean:.3f}" for mean in means], f"{agree:.2f}"])
-    return table(["beams", "compared by", "M, coarse: median", "M, fine", "mean AP, coarse", "mean AP, fine", "similarities of all pairs, coarse against fine: Spearman's ρ"], rows, 2)
+            rows.append(
+                [
+                    f"{names[0]} / {names[1]}, {len(both)} runs" if what == "coordinates" else "",
+                    WORDS.get(what, "rotation spectrum"),
+                    size(sizes[0]),
+                    size(sizes[1]),
+                    *[f"{mean:.3f}" for mean in means],
+                    f"{agree:.2f}",
+                ]
+            )
+    return table(
+        [
+            "beams",
+            "compared by",
+            "M, coarse: median",
+            "M, fine",
+            "mean AP, coarse",
+            "mean AP, fine",
+            "similarities of all pairs, coarse against fine: Spearman's ρ",
+        ],
+        rows,
+        2,
+    )
 
 
 def eigenvalues(bench):
@@ -167,7 +213,10 @@ def clear_queries(bench):
         case = bench.cases["apart"]
         bench.representatives = {}
         for name, _, similarity in bench.methods:
-            precision = {mode: np.array([judged(similarity(run), run, case.label)[1] for run in case.members(mode) if case.bundle.clear[run]]) for mode in MODES}
+            precision = {
+                mode: np.array([judged(similarity(run), run, case.label)[1] for run in case.members(mode) if case.bundle.clear[run]])
+                for mode in MODES
+            }
             bench.representatives[name.replace("**", "")] = precision
     return bench.representatives
 
@@ -179,7 +228,14 @@ def representatives(bench):
     return table(["compared by", *[f"{mode}: least / median / largest" for mode in MODES]], rows)
 
 
-SHOWN = ("descriptor, coordinates", "descriptor, differences", "first 500, coordinates", "PCA, 3M components", "M hand-picked nodes", "rotation spectrum")
+SHOWN = (
+    "descriptor, coordinates",
+    "descriptor, differences",
+    "first 500, coordinates",
+    "PCA, 3M components",
+    "M hand-picked nodes",
+    "rotation spectrum",
+)
 
 
 def representatives_picture(bench):
@@ -188,14 +244,35 @@ def representatives_picture(bench):
     for place, name in enumerate(SHOWN):
         for offset, mode in zip((-0.25, 0, 0.25), MODES):
             values = clear_queries(bench)[name][mode]
-            axes.plot(place + offset + random.uniform(-0.07, 0.07, len(values)), values, "o", ms=2.8, alpha=0.7, color=COLOUR[mode], label=f"{mode}, {len(values)} clear runs" if place == 0 else None)
+            axes.plot(
+                place + offset + random.uniform(-0.07, 0.07, len(values)),
+                values,
+                "o",
+                ms=2.8,
+                alpha=0.7,
+                color=COLOUR[mode],
+                label=f"{mode}, {len(values)} clear runs" if place == 0 else None,
+            )
             axes.plot([place + offset - 0.1, place + offset + 0.1], [np.median(values)] * 2, color=COLOUR[mode], lw=2)
             chance = np.mean(case.label == mode)
             axes.plot([place + offset - 0.1, place + offset + 0.1], [chance] * 2, color="#888888", lw=0.8)
-    axes.set(xticks=range(len(SHOWN)), xticklabels=[name.replace(", ", ",\n").replace("M hand-picked ", "M hand-picked\n").replace("rotation ", "rotation\n") for name in SHOWN], ylabel="average precision", ylim=(0.25, 1.02))
+    axes.set(
+        xticks=range(len(SHOWN)),
+        xticklabels=[name.replace(", ", ",\n").replace("M hand-picked ", "M hand-picked\n").replace("rotation ", "rotation\n") for name in SHOWN],
+        ylabel="average precision",
+        ylim=(0.25, 1.02),
+    )
     axes.legend(loc="upper left", bbox_to_anchor=(1, 1), fontsize=8, title="dot: a representative\nbar: median\ngrey: chance", title_fontsize=8)
     return figure
 
 
-TABLES = {"seeds": seeds, "basis": basis, "noise": noise, "moments": moments, "meshes": meshes, "eigenvalues": eigenvalues, "representatives": representatives}
+TABLES = {
+    "seeds": seeds,
+    "basis": basis,
+    "noise": noise,
+    "moments": moments,
+    "meshes": meshes,
+    "eigenvalues": eigenvalues,
+    "representatives": representatives,
+}
 PICTURES = {"experiment-representatives": representatives_picture}
