@@ -55,7 +55,7 @@ def place(bench):
                 [
                     f"{name}, {len(runs)} clear crush runs" if words == "coordinates" else "",
                     words,
-                    f"{rho:+.2f}",
+                    f"{rho:+z.2f}",
                     f"{crush:.2f}",
                     f"{distance:.0f} mm of {far:.0f} mm",
                 ]

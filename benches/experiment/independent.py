@@ -94,7 +94,7 @@ def certificate(bench):
         )
     head = [
         "beam",
-        "components",
+        "zero eigenvalues",
         "counts agree",
         "residual over λ₅₀₀",
         "orthogonality",

@@ -119,6 +119,29 @@ def ranking(bench):
     return table(["compared by", "numbers", "precision at 9", "average precision", "ROC area", "mean AP, every run the query", "mean"], rows)
 
 
+def elsewhere(bench):
+    """The main rows on every mesh, as `compare` says."""
+    rows = []
+    kinds = [
+        ("descriptor, coordinates", "coordinates", "descriptor"),
+        ("first M, coordinates", "coordinates", "first M"),
+        ("first 500, coordinates", "coordinates", "first 500"),
+    ]
+    kinds += [
+        ("descriptor, differences", "difference", "descriptor"),
+        ("PCA, M components", "difference", "PCA"),
+        ("rotation spectrum", "rotation", "rotation spectrum"),
+    ]
+    for name, case in bench.beams.items():
+        for words, select, method in kinds:
+            found = [case.row(mode, select, method) for mode in MODES]
+            each = lambda key, digits: " / ".join(f"{row[key]:.{digits}f}" for row in found)
+            means = np.mean([row["mean_average_precision"] for row in found])
+            cells = [each("precision_at_9", 2), each("average_precision", 3), each("mean_average_precision", 3), f"{means:.3f}"]
+            rows.append([name if words == kinds[0][0] else "", words, *cells])
+    return table(["beam", "compared by", "precision at 9", "average precision", "mean AP, every run the query", "mean"], rows, 2)
+
+
 def confusion(bench):
     """Each run to the mode whose representative's descriptor it is most similar to, by `crumple search`."""
     case, rows = bench.cases["apart"], []
@@ -192,4 +215,12 @@ def cloud_separates(bench):
     return table(["coefficients", "nearest run has the same label", "three k-means groups, adjusted Rand index"], rows)
 
 
-TABLES = {"sizes": sizes, "cloud": cloud_separates, "nearest": nearest, "ranking": ranking, "confusion": confusion, "modes": modes_found}
+TABLES = {
+    "sizes": sizes,
+    "cloud": cloud_separates,
+    "nearest": nearest,
+    "ranking": ranking,
+    "elsewhere": elsewhere,
+    "confusion": confusion,
+    "modes": modes_found,
+}

@@ -38,12 +38,12 @@ def summary(bench):
     literal = kept.get(("letter", "fine", "α > t"))
     mean = lambda name: f"{kept['ranking', name]:.3f}"
     confusion = lambda words: f"{100 * kept['confusion', words]:.0f} %"
-    rho = lambda words: f"{kept['place', 'apart', words]:+.2f}"
+    rho = lambda words: f"{kept['place', 'apart', words]:+z.2f}"
     end = lambda method: f"{np.mean([errors[-1] for errors, _ in curves.found(bench)['difference', method].values()]):.1f}"
     moved = {name: np.median(values) for name, values in shifts(bench).items()}
     numbers = spread([3 * case.row(mode, "coordinates", "descriptor")["size"] for mode in MODES], "{:d}")
     rows = [
-        ["the coefficients of the first eigenvector show the modes", "`crumple report joined`", "[cloud](#the-cloud)"]
+        ["the coefficients of the first eigenvector show the modes", "`crumple report joined -o joined.html`", "[cloud](#the-cloud)"]
         + [f"yes: {100 * kept['cloud', 'eigenvector 1']:.0f} % of the runs have their own kind as the nearest by three numbers"],
         ["clusters of the first 500 are the three modes", "`crumple modes plain --by displacement --count 3`", "[modes](#modes-without-labels)"]
         + [f"no: adjusted Rand index {index(case, 'displacement')}; by rotation {index(case, 'rotation')}"],

@@ -29,8 +29,9 @@ def unseen(bench):
     case, rows = bench.cases["apart"], []
     everything, size = np.arange(len(case.runs)), lambda run: rivals.size_of(case, run)
     kinds = {mode: (case.members(mode), np.flatnonzero((case.label != mode) & (case.label != "mixed"))) for mode in MODES}
-    hit = np.flatnonzero((case.label == "crush") & case.bundle.clear & (case.fold_positions > case.rest[:, 0].max() / 2))
-    kinds["crush at the hit end"] = hit, np.setdiff1d(everything, hit)
+    beyond = case.fold_positions > case.rest[:, 0].max() / 2
+    hit = np.flatnonzero((case.label == "crush") & case.bundle.clear & beyond)
+    kinds["crush at the hit end"] = hit, np.flatnonzero((case.label != "mixed") & ~((case.label == "crush") & beyond))
     for kind, (runs, others) in kinds.items():
         whole = case.rms(case.displacements[runs])
         ranks = lambda similarity: f"{mean_average_precision(similarity, case.label, runs):.3f}"

@@ -16,8 +16,14 @@ def with_field(bench):
     return bench.field_case
 
 
+def explained(groups, values):
+    """Share of the variance of `values` that groups explain (η²)."""
+    between = sum((groups == group).sum() * (values[groups == group].mean() - values.mean()) ** 2 for group in np.unique(groups))
+    return between / ((values - values.mean()) ** 2).sum()
+
+
 def grouped(bench):
-    """Three modes by the program, by what is grouped and which states, beside the labels."""
+    """Three modes by the program, by what is grouped and which states, beside the labels and the place of the deformation."""
     case, rows = with_field(bench), []
     kept = case.label != "mixed"
     states = [
@@ -30,10 +36,11 @@ def grouped(bench):
         for _, words in states:
             found = case.ask("modes", "--by", by, "--count", 3, *words)["modes"]
             of = {run: group for group, mode in enumerate(found) for run in mode["members"]}
-            cells.append(f"{adjusted_rand_score(case.label[kept], np.array([of[run] for run in case.runs])[kept]):.2f}")
-        bench.kept["grouped", by] = cells[1] if by != FIELD else cells[0]
+            groups = np.array([of[run] for run in case.runs])[kept]
+            cells += [f"{adjusted_rand_score(case.label[kept], groups):z.2f}", f"{explained(groups, case.fold_positions[kept]):.2f}"]
+        bench.kept["grouped", by] = cells[0] if by == FIELD else cells[2]
         rows.append([by, *cells])
-    return table(["runs alike by", *[name for name, _ in states]], rows)
+    return table(["runs alike by", *[words for name, _ in states for words in (f"{name}: index", "place, η²")]], rows)
 
 
 def verified(bench):
