@@ -1,7 +1,7 @@
 """How isometric the runs are, what that does to eigenvalues and eigenvectors, and what it does to similarity.
 
-The basis is that of the undeformed part. For the check `crumple eigen` computes the basis of deformed shapes as meshes of
-their own, the two sheets apart, as many of the same vertices.
+The basis of a study is that of the undeformed part. For the check `crumple eigen RUN@last` computes that of a deformed state as a
+mesh of its own: the same vertices and triangles, the two sheets apart.
 """
 
 import os
@@ -53,12 +53,6 @@ def strains(bench):
     return table(head, rows, 2)
 
 
-def write_obj(path, points, triangles):
-    with open(path, "w") as file:
-        file.writelines("v {:.9g} {:.9g} {:.9g}\n".format(*point) for point in points)
-        file.writelines("f {} {} {}\n".format(*(corner + 1)) for corner in triangles)
-
-
 def vertex_areas(case, points):
     """A third of each face's area to each of its corners, N."""
     corners = points[case.triangles]
@@ -66,13 +60,14 @@ def vertex_areas(case, points):
     return np.bincount(case.triangles.ravel(), np.repeat(area / 3, 3), len(points))
 
 
-def eigenpairs(bench, case, points):
-    """Eigenvalues, eigenvectors of a shape by `crumple eigen`."""
-    mesh, basis = (os.path.join(bench.options.scratch, name) for name in ("shape.obj", "shape.safetensors"))
-    write_obj(mesh, points, case.triangles)
+def eigenpairs(bench, case, run, state=""):
+    """Eigenvalues, eigenvectors of a run's surface by `crumple eigen`: undeformed, or in a state."""
+    basis = os.path.join(bench.options.scratch, "shape.safetensors")
+    mesh = os.path.join(case.bundle.runs_folder, run) + state
     subprocess.run([case.program, "--quiet", "eigen", mesh, "-K", str(COUNT), "-o", basis], check=True, stdout=subprocess.DEVNULL)
     found = load_file(basis)
-    assert np.allclose(found["points"], points, atol=1e-5), "the mesh keeps its vertices"
+    expected = case.shapes[case.runs.index(run)] if state else case.rest
+    assert np.allclose(found["points"], expected, atol=1e-5), "the vertices are those of the study"
     return found["eigenvalues"], found["eigenvectors"]
 
 
@@ -80,10 +75,10 @@ def shifts(bench):
     """Of the last state of every run: quantities by name."""
     if not hasattr(bench, "shifts"):
         case = bench.cases["apart"]
-        values, vectors = eigenpairs(bench, case, case.rest)
+        values, vectors = eigenpairs(bench, case, case.runs[0])
         out = {name: [] for name in ("shift", "largest", "scale", "area", "rest", "rest largest", "span", "shape")}
-        for shape in case.shapes:
-            own_values, own = eigenpairs(bench, case, shape)
+        for run, shape in zip(case.runs, case.shapes):
+            own_values, own = eigenpairs(bench, case, run, "@last")
             ratio = own_values[NULL:] / values[NULL:]
             scale = np.exp(np.log(ratio).mean())
             out["shift"].append(np.median(np.abs(ratio - 1)))

@@ -93,7 +93,7 @@ def summary(bench):
         + [f"for crush {kept['verified', 'coordinates', 'crush']}; rotation spectrum {kept['verified', 'rotation spectrum', 'crush']}"],
         [
             "shapes in a crash are ε-isometric: nearly the same eigenbasis, Laplacians up to a factor",
-            "`crumple eigen shape.obj`",
+            "`crumple eigen examples/hat-section/runs/run_007@last -K 50`",
             "[isometry](#isometry)",
         ]
         + [
