@@ -41,14 +41,10 @@ example:
     cargo run --release -- analyze examples/hat-section/runs --params examples/hat-section/inputs.csv --join 2.5 -o {{ study }}
     test -s {{ study }}/report.html
 
-# the tables of docs/experiment.md
+# the tables and pictures of docs/experiment.md, in a few minutes; without ../shared those of the fine bundle are left out
 experiment:
-    cargo build --release
-    rm -rf target/plain target/joined
-    target/release/crumple analyze examples/hat-section/runs -o target/plain
-    target/release/crumple analyze examples/hat-section/runs --join 2.5 -o target/joined
-    target/release/crumple compare target/plain --labels examples/hat-section/labels.csv
-    target/release/crumple compare target/joined --labels examples/hat-section/labels.csv
+    cargo build --release -p crumple-cli -p structures
+    python3 benches/experiment --write docs/experiment.md
 
 # the tables of docs/joining.md: sheets apart, joined by distance, by the deck's welds, and with their nodes merged
 joining:

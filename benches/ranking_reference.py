@@ -121,13 +121,21 @@ def average_precision(right: np.ndarray) -> float:
     return float((np.cumsum(right) / np.arange(1, len(right) + 1))[right].mean())
 
 
-def evaluate(study: Study, rank: Ranker) -> Iterator[str]:
-    """Table cells for each mode: mode, M, precision at 9, average precision, mean over all queries."""
+def judged(study: Study, rank: Ranker) -> dict[str, tuple[int, float, float, float]]:
+    """By mode: M, precision at 9 and average precision of its representative, mean average precision over all its runs."""
+    found = {}
     for mode in MODES:
         is_right = study.labels == mode
         m, order = rank(study.representative(mode))
         mean = np.mean([average_precision(is_right[rank(int(query))[1]]) for query in np.flatnonzero(is_right)])
-        yield f"{mode} | {m} | {is_right[order[:NEAREST]].mean():.2f} | {average_precision(is_right[order]):.3f} | {mean:.3f} |"
+        found[mode] = m, float(is_right[order[:NEAREST]].mean()), average_precision(is_right[order]), float(mean)
+    return found
+
+
+def evaluate(study: Study, rank: Ranker) -> Iterator[str]:
+    """Table cells for each mode: mode, M, precision at 9, average precision, mean over all queries."""
+    for mode, (m, precision, average, mean) in judged(study, rank).items():
+        yield f"{mode} | {m} | {precision:.2f} | {average:.3f} | {mean:.3f} |"
 
 
 def print_ranking(study: Study) -> None:
@@ -141,23 +149,26 @@ def print_ranking(study: Study) -> None:
         print(f"| PCA | displacements | {cells}")
 
 
-def print_variations(study: Study) -> None:
-    print("\n| compared | method | function | mode | M (eigenvectors) | precision at 9 | average precision | mean AP, all queries of the mode |\n|---|---|---|---|---|---|---|---|")
+def variations(study: Study) -> Iterator[tuple[str, str, np.ndarray, np.ndarray, bool]]:
+    """Name, function, values that choose the set, values that are compared on it, whether by distance instead of cosine."""
     frequency = np.sqrt(np.maximum(study.eigenvalues, 0))[:, None]
     for function, values in study.coefficients.items():
         centred, spread = values - values.mean(axis=0), values.std(axis=0)
-        variations = {
-            "centred": centred,
-            "weighted by sqrt(lambda)": values * frequency,
-            "centred, weighted by sqrt(lambda)": centred * frequency,
-            "weighted by 1/spread": values / spread,
-            "centred, weighted by 1/spread": centred / spread,
-            "Euclidean": values,
-        }
-        for name, compared in variations.items():
-            for subset in ("descriptor", "first M", "first K"):
-                for cells in evaluate(study, ranker(values, compared, subset, euclidean=name == "Euclidean")):
-                    print(f"| {name} | {subset} | {function} | {cells}")
+        yield "cosine", function, values, values, False
+        yield "centred", function, values, centred, False
+        yield "weighted by √λ", function, values, values * frequency, False
+        yield "centred, weighted by √λ", function, values, centred * frequency, False
+        yield "weighted by 1/spread", function, values, values / spread, False
+        yield "centred, weighted by 1/spread", function, values, centred / spread, False
+        yield "Euclidean", function, values, values, True
+
+
+def print_variations(study: Study) -> None:
+    print("\n| compared | method | function | mode | M (eigenvectors) | precision at 9 | average precision | mean AP, all queries of the mode |\n|---|---|---|---|---|---|---|---|")
+    for name, function, chosen, compared, euclidean in variations(study):
+        for subset in ("descriptor", "first M", "first K"):
+            for cells in evaluate(study, ranker(chosen, compared, subset, euclidean)):
+                print(f"| {name} | {subset} | {function} | {cells}")
 
 
 def print_modes(study: Study) -> None:

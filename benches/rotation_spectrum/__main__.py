@@ -8,10 +8,13 @@ the marks that carry its name.
 
 import argparse
 import os
-import re
 import subprocess
+import sys
+
+sys.path.append(os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir))
 
 import bundles
+import pages
 import tables
 
 
@@ -57,16 +60,7 @@ def main():
         made[name] = make(bench)
         print(f"### {name}\n\n{made[name]}\n", flush=True)
     if options.write:
-        write(options.write, made)
-
-
-def write(path, made):
-    """Puts tables between their marks on a page."""
-    page = open(path).read()
-    for name, text in made.items():
-        page = re.sub(f"(<!-- table: {name} -->\n).*?(<!-- end -->)", lambda match: f"{match[1]}\n{text}\n\n{match[2]}", page, flags=re.S)
-    with open(path, "w") as file:
-        file.write(page)
+        pages.write(options.write, made)
 
 
 if __name__ == "__main__":

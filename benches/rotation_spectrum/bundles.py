@@ -9,6 +9,8 @@ import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 
+MEASURES = ("rms", "max", "captured", "rigid_share", "strain_median", "strain_p95", "area_median", "area_p95", "turn")
+
 
 @dataclass
 class Bundle:
@@ -31,6 +33,8 @@ class Bundle:
     energy: np.ndarray = None  # runs: the squared norm of the whole rotation field
     states: pd.DataFrame = None  # run, state, time of every state
     rho_states: np.ndarray = None  # states x K x 3
+    delta_states: np.ndarray = None  # states x K x 3
+    measures: pd.DataFrame = None  # rms to turn of every state
     energy_states: np.ndarray = None
     baseline: np.ndarray = None  # K x 3: coefficients of the undeformed coordinates
 
@@ -47,12 +51,12 @@ def crumple(program, *arguments):
     subprocess.run([program, "--quiet", *map(str, arguments)], check=True, stdout=subprocess.DEVNULL)
 
 
-def make(program, name, runs_folder, labels, scratch, fold, join=None, eigenpairs=500):
-    """The study of all runs of a folder, made anew, and read."""
+def make(program, name, runs_folder, labels, scratch, fold, join=None, eigenpairs=500, more=()):
+    """The study of all runs of a folder, made anew, and read; `more`: further words for `init`."""
     study = os.path.join(scratch, name.replace(", ", "-").replace(" ", "-"))
     subprocess.run(["rm", "-rf", study, study + "-arrays"], check=True)
     reference = sorted(glob.glob(os.path.join(runs_folder, "run_*")))[0]
-    options = ["-K", eigenpairs] + (["--join", join] if join else [])
+    options = ["-K", eigenpairs] + (["--join", join] if join else []) + list(more)
     crumple(program, "init", study, "--reference", reference, *options)
     crumple(program, "add", study, runs_folder)
     crumple(program, "export", study, "-o", study + "-arrays", "--format", "parquet", "--last")
@@ -70,7 +74,8 @@ def read(bundle, labels):
     columns = {letter: [f"{letter}{k}_{c}" for k in range(1, size + 1) for c in "xyz"] for letter in "dr"}
     triples = lambda rows, letter: rows[columns[letter]].to_numpy(float).reshape(len(rows), size, 3)
     bundle.states = table[["run", "state", "time"]]
-    bundle.rho_states = triples(table, "r")
+    bundle.measures = table[[column for column in MEASURES if column in table]]
+    bundle.rho_states, bundle.delta_states = triples(table, "r"), triples(table, "d")
     last = table.groupby("run").tail(1)
     bundle.runs = list(last.run)
     bundle.rho, bundle.delta = triples(last, "r"), triples(last, "d")

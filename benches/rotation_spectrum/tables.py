@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 import bundles
 import judge
 import spectra
+from pages import table
 
 
 class Bench:
@@ -52,11 +53,6 @@ class Bench:
         if made.energy is None:
             self.project_here(made)
         return made
-
-
-def table(head, rows):
-    line = lambda cells: "| " + " | ".join(map(str, cells)) + " |"
-    return "\n".join([line(head), line(["---"] + ["---:"] * (len(head) - 1))] + [line(row) for row in rows])
 
 
 def per_mode(found):

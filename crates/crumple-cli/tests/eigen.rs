@@ -239,3 +239,23 @@ fn a_study_keeps_its_operator_and_its_mass() {
         crumple!["init", &study, "--reference", &reference].refused(&["study is here"]);
     }
 }
+
+#[test]
+fn a_state_is_a_mesh_of_its_own() {
+    let run = example_run("run_007");
+    let at = |state: &str| PathBuf::from(format!("{}@{state}", run.display()));
+    let eigen = |mesh: &Path| crumple!["eigen", mesh, "-K", "20", "--json"].done().json();
+    let values = |seen: &Value| -> Vec<f64> {
+        seen["eigenvalues"].as_array().unwrap().iter().map(|value| value.as_f64().unwrap()).collect()
+    };
+    let (undeformed, first, last) = (eigen(&run), eigen(&at("0")), eigen(&at("last")));
+    assert_eq!(values(&undeformed), values(&first), "state 0 is the undeformed one");
+    assert_eq!(values(&last), values(&eigen(&at("3"))), "and 3 the last");
+    assert_eq!(undeformed["triangles"], last["triangles"]);
+    // The bound of a near isometry: edges keep their lengths but for a few, so eigenvalues move by some per cent.
+    let ratio = |k: usize| values(&last)[k] / values(&undeformed)[k];
+    assert!((2..20).all(|k| (0.8..1.25).contains(&ratio(k))) && (2..20).any(|k| (ratio(k) - 1.0).abs() > 1e-3));
+    crumple!["eigen", at("4")].refused(&["4 states", "@3", "no @4"]);
+    crumple!["eigen", at("last"), "--join", "2.5"].refused(&["--join", "undeformed"]);
+    crumple!["eigen", at("x")].refused(&["run_007@x"]);
+}

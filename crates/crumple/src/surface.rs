@@ -25,12 +25,18 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// Reads the surface of a mesh file, or the undeformed shells of a result file or of its folder (of the parts named;
-    /// all when none is).
+    /// Reads the surface of a mesh file, or the shells of a result file or of its folder (of the parts named; all when
+    /// none is): the undeformed ones, or with `@N` or `@last` behind the path those of a state, with the triangles of the
+    /// undeformed ones.
     ///
     /// # Errors
-    /// [`Error::NoSuchPath`], [`Error::MeshFile`], [`Error::Mesh`], and those of [`Run::open`] and [`Reference::of_run`].
+    /// [`Error::NoSuchPath`], [`Error::MeshFile`], [`Error::Mesh`], [`Error::UnknownState`], and those of [`Run::open`] and
+    /// [`Reference::of_run`].
     pub fn read(path: &Path, parts: &[String]) -> Result<Surface, Error> {
+        if let Some((path, state)) = state_named(path) {
+            let run = Run::open(path.display().to_string(), path)?;
+            return Surface::of_state(&run, state, parts);
+        }
         if !path.exists() {
             return Err(Error::NoSuchPath(path.to_owned()));
         }
@@ -60,10 +66,29 @@ impl Surface {
         })
     }
 
+    fn of_state(run: &Run, state: &str, parts: &[String]) -> Result<Surface, Error> {
+        let (id, states) = (run.id().to_owned(), run.times().len());
+        let number = if state == "last" { states.checked_sub(1) } else { state.parse().ok() };
+        let unknown = || Error::UnknownState { run: id.clone(), state: state.to_owned(), states };
+        let number = number.filter(|number| *number < states).ok_or_else(unknown)?;
+        let reference = Reference::of_run(run, parts)?;
+        let shape = reference.shape(run, &reference.place(run)?, number)?;
+        let mesh = reference.mesh.moved(shape).map_err(|source| Error::Mesh { run: id, source })?;
+        Ok(Surface { mesh, vertex_ids: reference.node_ids, unused_vertices: 0, notes: run.warnings() })
+    }
+
     fn of_run(run: &Run, parts: &[String]) -> Result<Surface, Error> {
         let Reference { mesh, node_ids, .. } = Reference::of_run(run, parts)?;
         Ok(Surface { mesh, vertex_ids: node_ids, unused_vertices: 0, notes: run.warnings() })
     }
+}
+
+/// The result file and the state that `RUN@N` or `RUN@last` names; none where a file has that very name, or there is no
+/// such run.
+pub fn state_named(path: &Path) -> Option<(&Path, &str)> {
+    let (run, state) = path.to_str()?.rsplit_once('@')?;
+    let is_state = state == "last" || (!state.is_empty() && state.bytes().all(|byte| byte.is_ascii_digit()));
+    (is_state && !path.exists() && Path::new(run).exists()).then_some((Path::new(run), state))
 }
 
 fn has_the_name_of_a_run(path: &Path) -> bool {

@@ -46,6 +46,14 @@ pub enum MeshError {
         /// How many vertices there are.
         vertices: usize,
     },
+    /// Positions for another number of vertices than the mesh has.
+    #[error("positions of {given} vertices, and the mesh has {expected}")]
+    OtherVertices {
+        /// How many vertices the mesh has.
+        expected: usize,
+        /// How many were given.
+        given: usize,
+    },
     /// A coordinate is NaN or infinite.
     #[error("vertex {vertex}: coordinates {point:?} must be finite")]
     NotFinite {
@@ -208,6 +216,19 @@ impl Mesh {
         (mesh, kept)
     }
 
+    /// The same faces, cut into the same triangles, with the vertices elsewhere: a deformed state of this mesh.
+    ///
+    /// # Errors
+    /// Another number of vertices, coordinates that are not finite.
+    pub fn moved(&self, vertices: Vec<[f64; 3]>) -> Result<Mesh, MeshError> {
+        let (expected, given) = (self.vertices.len(), vertices.len());
+        if given != expected {
+            return Err(MeshError::OtherVertices { expected, given });
+        }
+        check(&vertices, std::iter::empty::<&[u32]>())?;
+        Ok(Mesh { vertices, ..self.clone() })
+    }
+
     /// The three corner points of a triangle.
     pub(crate) fn corners(&self, triangle: [u32; 3]) -> [Point; 3] {
         triangle.map(|vertex| self.vertices[vertex as usize])
@@ -321,6 +342,21 @@ mod tests {
         assert_eq!(kept, [1, 2, 4, 5]);
         assert_eq!(small.triangles(), [[0, 1, 2], [0, 2, 3]]);
         assert_eq!(small.rings().collect::<Vec<_>>(), [(0, &[0u32, 1, 2, 3][..])]);
+    }
+
+    #[test]
+    fn a_moved_mesh_keeps_its_triangles() {
+        // Of this rhombus the other diagonal would be chosen.
+        let square = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]];
+        let rhombus = vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.9, 0.4, 0.0], [0.9, 0.4, 0.0]];
+        let mesh = Mesh::from_faces(square, &[[0, 1, 2, 3]]).unwrap();
+        let moved = mesh.moved(rhombus.clone()).unwrap();
+        assert_eq!((moved.triangles(), moved.vertices()), (mesh.triangles(), &rhombus[..]));
+        assert_ne!(Mesh::from_faces(rhombus.clone(), &[[0, 1, 2, 3]]).unwrap().triangles(), mesh.triangles());
+        assert_eq!(mesh.moved(rhombus[..3].to_vec()), Err(MeshError::OtherVertices { expected: 4, given: 3 }));
+        let mut broken = rhombus;
+        broken[1][2] = f64::INFINITY;
+        assert!(matches!(mesh.moved(broken), Err(MeshError::NotFinite { vertex: 1, .. })));
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use clap::Args;
 use crumple::eigen::{self, Precision, Solved};
-use crumple::surface::Surface;
+use crumple::surface::{Surface, state_named};
 use crumple::{Certificate, EigenOptions, Error, Kind, OperatorOptions, Watch};
 use serde_json::{Map, Value, json};
 
@@ -35,10 +35,11 @@ fn solver(certificate: &Certificate) -> Value {
 
 #[derive(Args)]
 #[command(
-    after_help = "The file holds eigenvalues [K], eigenvectors [K, N], mass [N], points, triangles and vertex_ids: safetensors.numpy.load_file opens it.\n\nExample, in the repository:\n  crumple eigen examples/hat-section/runs/run_001 -K 100 --join 2.5 -o basis.safetensors"
+    after_help = "The file holds eigenvalues [K], eigenvectors [K, N], mass [N], points, triangles and vertex_ids: safetensors.numpy.load_file opens it.\n\nExample, in the repository:\n  crumple eigen examples/hat-section/runs/run_001 -K 100 --join 2.5 -o basis.safetensors\n  crumple eigen examples/hat-section/runs/run_001@last -K 50"
 )]
 pub(crate) struct Eigen {
-    /// Mesh file (.obj .ply .stl .off .vtu .vtp) or result file or folder (d3plot: its undeformed shells)
+    /// Mesh file (.obj .ply .stl .off .vtu .vtp) or result file or folder (d3plot: its undeformed shells; @N or @last behind
+    /// it: those of a state, how far its spectrum is from that of the undeformed part)
     mesh: PathBuf,
     /// Eigenpairs K, 1 or more; a mesh with fewer vertices gives as many as it has [default: 500]
     #[arg(short = 'K', long, value_name = "K", allow_negative_numbers = true)]
@@ -117,6 +118,10 @@ impl Eigen {
         if !(options.tolerance > 0.0 && options.tolerance < 1e-2) {
             let (value, expected) = (options.tolerance.to_string(), "above 0 and below 0.01".into());
             return Err(Error::Value { name: "--tolerance", value, expected });
+        }
+        if let (Some(distance), Some(_)) = (self.join, state_named(&self.mesh)) {
+            let expected = "an undeformed mesh: in a fold, sheets that touch would be joined".into();
+            return Err(Error::Value { name: "--join", value: distance.to_string(), expected });
         }
         Ok(())
     }
