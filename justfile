@@ -93,7 +93,12 @@ bench-eigen *options:
     cargo build --release -p mesh-spectrum --example measure
     test -x target/bench-eigen/venv/bin/python || python3 -m venv target/bench-eigen/venv
     target/bench-eigen/venv/bin/pip install --quiet --requirement benches/eigen/requirements.txt
-    target/bench-eigen/venv/bin/python benches/eigen/run.py {{ options }}
+    target/bench-eigen/venv/bin/python benches/eigen/run.py --page docs/eigen.md {{ options }}
+
+# how time and memory of the eigenbasis grow with N and K: the second table of docs/eigen.md and its picture
+bench-growth *options:
+    cargo build --release -p mesh-spectrum --example measure
+    python3 benches/eigen/growth.py {{ options }}
 
 # fetch and bundle the report's JavaScript anew
 vendor:

@@ -8,7 +8,7 @@ Every run is a process of its own, and one file in SCRATCH/runs: what is there i
 stopped and taken up. `--prefix` is put before every measured command (`nice -n -5`, a lock). Wall seconds are those of
 the solution alone, without reading; CPU seconds and peak memory are the kernel's figures for the process. Peers run
 with OPENBLAS_CORETYPE and OPENBLAS_L2_SIZE unset, which slow them where they are set.
-Writes SCRATCH/table.md and SCRATCH/table.json.
+Writes SCRATCH/table.md and SCRATCH/table.json, and with `--page` the table of that page between its marks.
 """
 from __future__ import annotations
 
@@ -23,6 +23,9 @@ from statistics import median
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
+sys.path.insert(0, str(ROOT / "benches"))
+from pages import write  # noqa: E402
+
 MESHES = {"9k": "hat:9000", "100k": "hat:100000", "1M": "hat:1000000", "9k-apart": "hat-apart:9000", "100k-apart": "hat-apart:100000",
           "1M-apart": "hat-apart:1000000", "9k-closed": "closed:9000", "100k-closed": "closed:100000"}
 
@@ -53,6 +56,7 @@ def main() -> None:
     parser.add_argument("--program", type=Path, default=ROOT / "target/release/examples/measure")
     parser.add_argument("--slepc-python", default="/usr/bin/python3", help="a Python that has slepc4py (Debian: python3-slepc4py)")
     parser.add_argument("--table-only", action="store_true")
+    parser.add_argument("--page", type=Path, help="docs/eigen.md")
     options = parser.parse_args()
     prefix, peers = shlex.split(options.prefix), options.peers.split(",") if options.peers else []
     runs = options.scratch / "runs"
@@ -80,10 +84,13 @@ def main() -> None:
                     found = once(command, threads, prefix)
                     file.write_text(json.dumps(found))
                     print(file.stem, found.get("failed") or f"{found['wall']:.2f} s", flush=True)
-    table(options.scratch)
+    lines = table(options.scratch)
+    print("\n".join(lines))
+    if options.page:
+        write(options.page, {"peers": "\n".join(lines)})
 
 
-def table(scratch: Path) -> None:
+def table(scratch: Path) -> list[str]:
     """Medians of what has been run."""
     cases: dict[tuple, dict[str, list]] = {}
     for file in sorted((scratch / "runs").glob("*.json")):
@@ -116,7 +123,7 @@ def table(scratch: Path) -> None:
         lines.append(f"| {r['mesh']} | {r['pairs']} | {r['threads']} | {r['who']} | {r['runs']} | {r['wall']:.2f} | {r['process_cpu']:.2f} | {r['peak_mb']:.0f} "
                      f"| {r['residual']:.1e} | {r['orthogonality']:.1e} | {r['missing']:.0f} | {ratio} | {limit} |")
     (scratch / "table.md").write_text("\n".join(lines) + "\n")
-    print("\n".join(lines))
+    return lines
 
 
 if __name__ == "__main__":

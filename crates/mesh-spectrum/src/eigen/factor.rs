@@ -195,4 +195,47 @@ mod tests {
             }
         }
     }
+
+    /// A dense matrix is one supernode of as many columns, more than are eliminated together.
+    #[test]
+    fn wide_supernodes_are_factored_the_same_by_every_kind() {
+        for n in [8, 33, 70, 101] {
+            let value = |i: usize, j: usize| (((i.min(j) * 37 + i.max(j) * 11) % 29) as f64 - 14.0) / 29.0;
+            let entries = (0..n as u32).flat_map(|i| (0..n as u32).map(move |j| (i, j)));
+            let diagonal = |i: u32, j: u32| if i == j { 3.0 + i as f64 } else { 0.0 };
+            let entries: Vec<(u32, u32, f64)> =
+                entries.map(|(i, j)| (i, j, value(i as usize, j as usize) + diagonal(i, j))).collect();
+            let matrix = Csr::from_entries(n, entries);
+            let dense = faer::Mat::from_fn(n, n, |i, j| matrix.row(i).find(|e| e.0 == j).map_or(0.0, |e| e.1));
+            let eigenvalues = dense.self_adjoint_eigenvalues(Side::Lower).unwrap();
+            let shift = 0.5 * (eigenvalues[n / 2] + eigenvalues[n / 2 - 1]);
+            let solved = |kind: Kind| {
+                let symbolic = Symbolic::new(&matrix, kind).unwrap();
+                // Twice, because memory is used again.
+                let first = symbolic.factor(&matrix, shift + 0.1, &Progress::new(&(), 0)).unwrap();
+                symbolic.recycle(first);
+                let factor = symbolic.factor(&matrix, shift, &Progress::new(&(), 0)).unwrap();
+                assert_eq!(factor.below, n / 2);
+                let mut x: Vec<Row> = (0..=n).map(|i| std::array::from_fn(|k| ((i * 7 + k) % 5) as f64)).collect();
+                let b = x.clone();
+                kernel::solve(kind, &factor.packed, &mut x);
+                for (i, b) in b[..n].iter().enumerate() {
+                    for k in 0..WIDTH {
+                        let product: f64 = matrix.row(i).map(|(j, a)| a * x[j][k]).sum();
+                        // Rounding of 1e-16, times growth, times ‖A‖ ‖x‖, below 1e3.
+                        assert!((product - shift * x[i][k] - b[k]).abs() < 1e-12 * factor.growth.max(1.0), "{n}: {i}");
+                    }
+                }
+                x
+            };
+            let portable = solved(Kind::Portable);
+            for kind in [Kind::Avx2, Kind::Avx512].into_iter().filter(|kind| kind.is_available()) {
+                let fused = solved(kind);
+                assert_eq!(fused, solved(Kind::best()), "the fused kinds add in the same order");
+                for (a, b) in portable[..n].as_flattened().iter().zip(fused.as_flattened()) {
+                    assert!((a - b).abs() < 1e-9 * (1.0 + a.abs()), "{a} is not {b}");
+                }
+            }
+        }
+    }
 }

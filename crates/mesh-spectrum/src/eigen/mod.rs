@@ -1,10 +1,11 @@
 //! The lowest eigenpairs of L φ = λ M φ, with the evidence that they are right and that none is missing.
 //!
-//! In the order of the work: `component` (mass scaled out, one connected component at a time), `spectrum` (how far each
-//! one's spectrum must go), `factor` (L D Lᵀ and inertia), `solve` (its solves), `chain` (shifts, one after another),
+//! In the order of the work: `component` (mass scaled out, one connected component at a time), `order` (elimination
+//! order), `spectrum` (how far each one's spectrum must go), `factor` with `front` (L D Lᵀ and inertia), `solve` (its
+//! solves), `chain` (shifts, one after another),
 //! `slice` (the pairs around a shift), `krylov` with `projected` and `loss` (the space they are found in), `assemble`
 //! (chains to a spectrum), `finish` (orthogonality, residuals), `output` (eigenvectors on vertices), `basis` (the
-//! result). `block` and `kernel` hold what the time is spent in. `general` does all of it for a mass that is not
+//! result). `block`, `pages` and `kernel` hold what the time is spent in. `general` does all of it for a mass that is not
 //! diagonal.
 
 mod assemble;
