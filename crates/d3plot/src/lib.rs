@@ -42,6 +42,7 @@ mod rigid;
 mod titles;
 
 // the states
+mod motion;
 mod quantity;
 mod ranges;
 mod results;
