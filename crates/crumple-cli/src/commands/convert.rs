@@ -27,7 +27,7 @@ pub(crate) struct Convert {
     /// Byte order: little or big [default: little]
     #[arg(long, value_name = "ORDER")]
     byte_order: Option<String>,
-    /// The most bytes of a file; what is longer runs on into the next [default: the solver's, 7 × 512 × 512 words]
+    /// The most bytes of a file; what is longer runs on into the next, which few programs read [default: the solver's, 7 × 512 × 512 words, or what one state needs]
     #[arg(long, value_name = "BYTES", value_parser = clap::value_parser!(u64).range(4096..))]
     file_bytes: Option<u64>,
     /// The most states of a file [default: as many as fit]
