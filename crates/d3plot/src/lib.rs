@@ -72,5 +72,5 @@ pub use values::{Layers, Real, Rows};
 pub use warning::Warning;
 pub use words::{ByteOrder, Precision};
 pub use write::{
-    Content, Copied, DeletionTable, Positions, StateWriter, Stored, Thermal, WordsEach, WriteOptions, Writer,
+    Content, Copied, DeletionTable, Keep, Positions, StateWriter, Stored, Thermal, WordsEach, WriteOptions, Writer,
 };

@@ -3,7 +3,7 @@
 
 mod shared;
 
-use d3plot::{Error, Family, Warning, WriteOptions};
+use d3plot::{Error, Family, Keep, Warning, WriteOptions};
 
 use shared::{Copy, testdata};
 
@@ -135,7 +135,7 @@ fn a_copy_has_the_rebuilt_nodes() {
         let place = tempfile::tempdir().unwrap();
         let root = place.path().join("d3plot");
         let options = WriteOptions { precision: family.header().precision, ..WriteOptions::default() };
-        let copied = family.copy(&root, &options, |_| true).unwrap();
+        let copied = family.copy(&root, Keep::default(), &options, |_| true).unwrap();
         assert_eq!(copied.left_out.contains(&"velocity"), !velocity, "{name}");
         let again = Family::open(&root).unwrap();
         assert_eq!(again.warnings(), []);

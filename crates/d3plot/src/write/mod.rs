@@ -14,7 +14,7 @@ mod state;
 use std::path::Path;
 
 pub use content::{Content, DeletionTable, Positions, Stored, Thermal, WordsEach};
-pub use copy::Copied;
+pub use copy::{Copied, Keep};
 pub use state::StateWriter;
 
 use crate::control::Control;
@@ -184,6 +184,11 @@ impl Writer {
     /// States written so far.
     pub fn states(&self) -> usize {
         self.states
+    }
+
+    /// Words a row of a table has, if the states hold it.
+    fn columns(&self, table: &str) -> Option<usize> {
+        self.layout.field(table).map(|field| field.columns as usize)
     }
 
     /// Words of a state.
