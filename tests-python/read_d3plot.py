@@ -38,11 +38,15 @@ def with_lasso(root: str) -> dict:
         strain = of("element_shell_effective_plastic_strain")
         corners = []
         for kind in ("solid", "tshell", "shell", "beam"):
+            if f"element_{kind}_node_indexes" not in arrays:
+                continue
             nodes = np.sort(arrays[f"element_{kind}_node_indexes"][:, : 2 if kind == "beam" else None], axis=1).astype(int)
             # an element of fewer corners repeats nodes
             first = np.diff(nodes, axis=1, prepend=-1) != 0
             corners.append(nodes[first])
-        corners = np.concatenate(corners)
+        corners = np.concatenate(corners) if corners else np.zeros(0, int)
+        # a mesh that was misread may name nodes that are not there
+        corners = corners[(corners >= 0) & (corners < len(arrays["node_coordinates"]))]
         nodal = {name: of(key) for name, key in (("coordinates", "node_displacement"), ("velocity", "node_velocity"))}
         solid = of("element_solid_effective_plastic_strain")
         return {
