@@ -46,6 +46,7 @@ mod motion;
 mod quantity;
 mod ranges;
 mod results;
+mod rotation;
 mod series;
 mod state;
 mod strain;

@@ -10,18 +10,16 @@
 use crate::error::Error;
 use crate::family::Family;
 use crate::rigid::{NO_BODY, uncertain_rigid_bodies};
+use crate::rotation::{
+    Matrix, Vector, cross, is_identity, is_rotation, mean, minus, plus, rotation_vector, square, times, turn,
+};
 use crate::values::{Real, Rows};
-
-type Vector = [f64; 3];
-type Matrix = [Vector; 3];
 
 /// States that are looked at to learn how to read the motion.
 const LOOKS: usize = 16;
 /// Nodes beside the bodies that are looked at.
 const NEIGHBOURS: usize = 4096;
-/// Entries of Rᵀ R − 1 up to which R is a rotation, and of D − 1 up to which a body has not turned: rounding of single
-/// precision, and of solvers that add up small turns.
-const ROUNDING: f64 = 1e-3;
+/// Entries of D − 1 up to which a body has not turned.
 const UNTURNED: f64 = 1e-5;
 /// One reading is believed if it leaves this many times less unexplained, as a sum of squares, than the other.
 const CLEARLY: f64 = 4.0;
@@ -72,10 +70,13 @@ impl Motion {
             return refuse("and no state shows where they start");
         }
         let mut motion = Motion { by_columns: false, rates: false, start };
+        let count = family.starts.len();
+        if count == 1 {
+            return Ok(Some(motion)); // nothing has moved yet
+        }
         let (mut turned, mut beside, mut spun, mut went) =
             (false, Misfit::default(), Misfit::default(), Misfit::default());
         let neighbours = neighbours(family);
-        let count = family.starts.len();
         let mut looks: Vec<usize> = (0..LOOKS).map(|look| look * (count - 1) / (LOOKS - 1)).collect();
         looks.dedup();
         for state in looks {
@@ -165,11 +166,13 @@ impl Motion {
             let (Some(pose), Some(start)) = (here.get(*body as usize), self.start.get(*body as usize)) else {
                 continue;
             };
-            if !is_rotation(&pose.matrix) {
+            if state > 0 && !is_rotation(&pose.matrix) {
                 continue;
             }
             let origin = &family.geometry().coordinates[node];
-            let arm = times(&self.turn(pose, start), &minus(origin, &start.centre));
+            let arm = minus(origin, &start.centre);
+            // the first state is where the bodies start
+            let arm = if state == 0 { arm } else { times(&self.turn(pose, start), &arm) };
             let value = match field {
                 "velocity" => plus(&pose.velocity, &cross(&pose.spin, &arm)),
                 "acceleration" => {
@@ -295,68 +298,6 @@ impl Misfit {
     }
 }
 
-fn is_rotation(matrix: &Matrix) -> bool {
-    let identity = product(&transposed(matrix), matrix);
-    let [a, b, c] = matrix;
-    is_identity(&identity, ROUNDING) && square(&minus(&cross(a, b), c)) < 1.0
-}
-
 fn has_turned(pose: &Pose, start: &Pose) -> bool {
     !is_identity(&turn(&pose.matrix, &start.matrix, false), UNTURNED)
-}
-
-/// NaN is not near anything.
-fn is_identity(matrix: &Matrix, rounding: f64) -> bool {
-    let near = |row: usize, column: usize| (matrix[row][column] - f64::from(u8::from(row == column))).abs() <= rounding;
-    (0..3).all(|row| (0..3).all(|column| near(row, column)))
-}
-
-/// The rotation between two matrices of nine words each.
-fn turn(after: &Matrix, before: &Matrix, by_columns: bool) -> Matrix {
-    if by_columns { product(&transposed(after), before) } else { product(after, &transposed(before)) }
-}
-
-/// Axis of a rotation, as long as its angle in radians.
-fn rotation_vector(m: &Matrix) -> Vector {
-    let axis = [m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1]].map(|value| value / 2.0);
-    let sine = square(&axis).sqrt();
-    let angle = sine.atan2((m[0][0] + m[1][1] + m[2][2] - 1.0) / 2.0);
-    axis.map(|value| if sine > f64::EPSILON { value * angle / sine } else { value })
-}
-
-fn product(a: &Matrix, b: &Matrix) -> Matrix {
-    let columns = transposed(b);
-    a.map(|row| columns.map(|column| dot(&row, &column)))
-}
-
-fn transposed(m: &Matrix) -> Matrix {
-    [0, 1, 2].map(|column| [m[0][column], m[1][column], m[2][column]])
-}
-
-fn times(m: &Matrix, v: &Vector) -> Vector {
-    m.map(|row| dot(&row, v))
-}
-
-fn dot(a: &Vector, b: &Vector) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn square(v: &Vector) -> f64 {
-    dot(v, v)
-}
-
-fn cross(a: &Vector, b: &Vector) -> Vector {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn plus(a: &Vector, b: &Vector) -> Vector {
-    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
-}
-
-fn minus(a: &Vector, b: &Vector) -> Vector {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-fn mean(a: &Vector, b: &Vector) -> Vector {
-    plus(a, b).map(|value| value / 2.0)
 }

@@ -7,10 +7,12 @@ mod fuzz;
 
 use std::path::Path;
 
+type Target = fn(&[u8]);
+
 #[test]
 fn the_corpus_of_the_fuzz_targets_gives_answers() {
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus");
-    let targets: [(&str, fn(&[u8])); 4] =
+    let targets: [(&str, Target); 4] =
         [("family", fuzz::family), ("header", fuzz::header), ("geometry", fuzz::geometry), ("state", fuzz::state)];
     for (name, target) in targets {
         let mut seen = 0;

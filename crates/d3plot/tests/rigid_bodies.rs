@@ -203,3 +203,16 @@ fn bodies_that_do_not_turn_need_no_rotation() {
     let way = |node: usize| [0, 1, 2].map(|axis| positions[node][axis] - start[node][axis]);
     assert!(near(&way(0), &way(1), 1e-3) && near(&way(1), &way(6), 1e-3));
 }
+
+#[test]
+fn a_run_with_one_state_needs_no_motion() {
+    let copy = Copy::of(FAMILY);
+    with_motion(&copy, |_, motion| motion[3..12].fill(0.5));
+    let words = Family::open(&testdata().join(FAMILY)).unwrap().header().words_per_state as usize;
+    let mark = (-999_999.0_f32).to_le_bytes();
+    copy.write("d3plot01", &[&copy.read("d3plot01")[..words * 4], &mark[..]].concat());
+    let family = open(&copy).unwrap();
+    assert_eq!((family.times(), family.warnings()[0].kind()), (&[0.0][..], "rigid-nodes"));
+    let positions = family.coordinates(0).unwrap().unwrap();
+    assert!(RIGID.iter().all(|&node| near(&positions[node], &family.geometry().coordinates[node], 1e-3)));
+}
