@@ -78,15 +78,18 @@ bench-read repeats="3":
 # the table of docs/reading.md: every test family read by us, lasso-python, VTK and dynars (the last: pip install dynars)
 read-table:
     cargo build --release
-    python3 benches/read_table.py target/release/crumple crates/d3plot/testdata ../shared/data/d3plot
+    python3 benches/read_table.py target/release/crumple crates/d3plot/testdata ../shared/data/d3plot --write docs/reading.md
 
-# fuzz the reader, `seconds` for each target; needs a nightly toolchain and cargo-fuzz
+# fuzz the readers of result files and of decks, `seconds` for each target; needs a nightly toolchain and cargo-fuzz
 fuzz seconds="300":
     for target in family header geometry state; do \
         mkdir -p target/fuzz-corpus/$target && \
         cargo +nightly fuzz run --fuzz-dir fuzz -s none $target target/fuzz-corpus/$target fuzz/corpus/$target -- \
             -max_total_time={{ seconds }} -max_len=60000 -timeout=10 -rss_limit_mb=2048 || exit 1; \
     done
+    mkdir -p target/fuzz-corpus/deck
+    cargo +nightly fuzz run --fuzz-dir crates/keyword-deck/fuzz -s none deck target/fuzz-corpus/deck crates/keyword-deck/fuzz/corpus/deck -- \
+        -max_total_time={{ seconds }} -max_len=4096 -timeout=10 -rss_limit_mb=512
 
 # the eigenbasis beside SciPy + CHOLMOD, LaPy, SLEPc and dense `eigh`; needs libsuitesparse-dev, python3-slepc4py and python3-scipy (Debian)
 bench-eigen *options:

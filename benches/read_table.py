@@ -1,13 +1,17 @@
 #!/usr/bin/env python3
 """The table case → ours → lasso-python → VTK → dynars of `docs/reading.md`.
 
-    python benches/read_table.py CRUMPLE FOLDER...
+    python benches/read_table.py CRUMPLE FOLDER... [--write PAGE]
+
+`--write` puts the table into PAGE, between the lines `<!-- read-table -->` and `<!-- /read-table -->`.
 
 Each FOLDER holds families, each with an `expected.json` that says what is in it. Every program reads every family in a process
 of its own, for two minutes at most, and is judged alike: the number of states, and least, largest and sum of the positions of all
 nodes in the first and in the last state (of VTK, which shows the nodes of elements only: least and largest lie within those,
 and the states are as many). Needs lasso-python, vtk and dynars (`pip install lasso-python==2.0.4 vtk==9.7.2 dynars==1.1.0`).
 """
+import argparse
+import importlib.metadata
 import json
 import math
 import subprocess
@@ -86,11 +90,15 @@ def judge(found, word, expected, box_only):
     return "right"
 
 
-def main():
-    crumple, *folders = sys.argv[1:]
-    print("| case | what it is | ours | lasso-python | VTK | dynars |\n| --- | --- | --- | --- | --- | --- |")
+def table(crumple, folders):
+    versions = {name: importlib.metadata.version(name) for name in ("lasso-python", "vtk", "dynars")}
+    names = " | ".join(f"{name} {version}" for name, version in versions.items())
+    yield f"| case | what it is | ours | {names} |"
+    yield "| --- | --- | --- | --- | --- | --- |"
     right = [0, 0, 0, 0]
-    for folder in sorted({path.parent for folder in folders for path in Path(folder).glob("*/expected.json")}, key=lambda path: path.name):
+    # some real families are in both folders
+    families = {path.parent.name: path.parent for folder in folders for path in Path(folder).glob("*/expected.json")}
+    for _, folder in sorted(families.items()):
         file = json.loads((folder / "expected.json").read_text())
         root, expected = str((folder / file["root"]).resolve()), file["expected"]
         answers = [
@@ -101,8 +109,25 @@ def main():
         ]
         right = [count + (answer in ("right", "refused")) for count, answer in zip(right, answers)]
         what = file.get("what", "").split(";")[0].split(",")[0].replace("|", "/")
-        print(f"| `{folder.name}` | {what} | {' | '.join(answers)} |", flush=True)
-    print(f"| | right, or refused rightly | {' | '.join(str(count) for count in right)} |")
+        yield f"| `{folder.name}` | {what} | {' | '.join(answers)} |"
+    yield f"| | right, or refused rightly | {' | '.join(str(count) for count in right)} |"
+
+
+def main():
+    parser = argparse.ArgumentParser(description="the table case → ours → lasso-python → VTK → dynars")
+    parser.add_argument("crumple")
+    parser.add_argument("folders", nargs="+")
+    parser.add_argument("--write", type=Path)
+    args = parser.parse_args()
+    lines = []
+    for line in table(args.crumple, args.folders):
+        print(line, flush=True)
+        lines.append(line)
+    if args.write:
+        page = args.write.read_text()
+        begin, end = "<!-- read-table -->\n", "<!-- /read-table -->"
+        before, rest = page.split(begin, 1)
+        args.write.write_text(before + begin + "\n".join(lines) + "\n" + end + rest.split(end, 1)[1])
 
 
 if __name__ == "__main__":

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""What lasso-python or VTK's reader finds in a d3plot family, as one line of JSON.
+"""What lasso-python or VTK's reader finds in d3plot families, as a line of JSON for each.
 
-    python read_d3plot.py lasso|vtk ROOT
+    python read_d3plot.py lasso|vtk ROOT...
 
-`times`; for the first and last state `coordinates` with `min`, `max` and `sum` over all nodes (lasso-python) or `min` and
-`max` over all blocks (VTK, whose blocks repeat nodes that parts share), the same of `velocity`, and `plastic_strain` of
-shells over all layers; the part titles.
+`times`; for the first and last state `coordinates` and `velocity` with `min`, `max` and `sum` over all nodes (lasso-python), and
+`plastic_strain` of shells over all layers; the part titles. VTK shows the nodes of elements only, those of several parts once for each, and
+numbers them anew: so `corners` are, of both, positions and velocities at the corners of all elements, one element after the other. Of both, too,
+words of the first three layers of shells and of the first point of solids.
 """
 from __future__ import annotations
 
@@ -35,7 +36,26 @@ def with_lasso(root: str) -> dict:
             return arrays[name][k] if name in arrays else None
 
         strain = of("element_shell_effective_plastic_strain")
+        corners = []
+        for kind in ("solid", "tshell", "shell", "beam"):
+            if f"element_{kind}_node_indexes" not in arrays:
+                continue
+            nodes = np.sort(arrays[f"element_{kind}_node_indexes"][:, : 2 if kind == "beam" else None], axis=1).astype(int)
+            # an element of fewer corners repeats nodes
+            first = np.diff(nodes, axis=1, prepend=-1) != 0
+            corners.append(nodes[first])
+        corners = np.concatenate(corners) if corners else np.zeros(0, int)
+        # a mesh that was misread may name nodes that are not there
+        corners = corners[(corners >= 0) & (corners < len(arrays["node_coordinates"]))]
+        nodal = {name: of(key) for name, key in (("coordinates", "node_displacement"), ("velocity", "node_velocity"))}
+        solid = of("element_solid_effective_plastic_strain")
         return {
+            "corners": {
+                **{name: stats(array[corners]) for name, array in nodal.items() if array is not None},
+                "shell_strain": stats(strain[:, :3].reshape(-1, 1)) if strain is not None and strain.shape[1] >= 3 else None,
+                "shell_stress": stats(of("element_shell_stress")[:, :3].reshape(-1, 6)) if of("element_shell_stress") is not None and strain.shape[1] >= 3 else None,
+                "solid_strain": stats(solid[:, :1].reshape(-1, 1)) if solid is not None else None,
+            },
             "coordinates": stats(of("node_displacement")),
             "velocity": stats(of("node_velocity")),
             "plastic_strain": stats(strain.reshape(-1, 1)) if strain is not None else None,
@@ -52,6 +72,7 @@ def with_vtk(root: str) -> dict:
     reader = vtkLSDynaReader()
     reader.SetFileName(root)
     reader.SetDeformedMesh(1)
+    reader.SetRemoveDeletedCells(0)
     reader.UpdateInformation()
     count = reader.GetNumberOfTimeSteps()
     times = [reader.GetTimeValue(k) for k in range(count)]
@@ -76,13 +97,33 @@ def with_vtk(root: str) -> dict:
         velocity = [grid.GetPointData().GetArray("Velocity") for grid in grids]
         velocity = np.vstack([vtk_to_numpy(array) for array in velocity]) if all(velocity) else None
 
-        def least_and_most(array):
-            found = stats(array)
-            return {key: found[key] for key in ("min", "max")} if found else None
+        def at_corners(array):
+            """Rows of all points of all cells but particles, which are cells of one point."""
+            rows, before = [], 0
+            for grid in grids:
+                for cell in range(grid.GetNumberOfCells()):
+                    ids = grid.GetCell(cell).GetPointIds()
+                    ids = {ids.GetId(corner) + before for corner in range(ids.GetNumberOfIds())}
+                    rows.extend(sorted(ids) if len(ids) > 1 else [])
+                before += grid.GetNumberOfPoints()
+            return stats(array[rows])
 
+        def cells(names: list, shape: tuple, kind: tuple) -> dict | None:
+            of_kind = [grid for grid in grids if grid.GetCellType(0) in kind]
+            found = [grid.GetCellData().GetArray(name) for grid in of_kind for name in names]
+            return stats(np.concatenate([vtk_to_numpy(array).reshape(shape) for array in found])) if found and all(found) else None
+
+        shells, solids, surfaces = (5, 9), (10, 12, 13, 14), ("", "InnerSurf", "OuterSurf")
         return {
-            "coordinates": least_and_most(points),
-            "velocity": least_and_most(velocity),
+            "corners": {
+                "coordinates": at_corners(points),
+                **({"velocity": at_corners(velocity)} if velocity is not None else {}),
+                "shell_strain": cells([f"EffPlastStrn{surface}" for surface in surfaces], (-1, 1), shells),
+                "shell_stress": cells([f"Stress{surface}" for surface in surfaces], (-1, 6), shells),
+                "solid_strain": cells(["EffPlastStrn"], (-1, 1), solids),
+            },
+            # for `benches/read_table.py`
+            "coordinates": {key: value for key, value in stats(points).items() if key != "sum"},
             "cells": sum(grid.GetNumberOfCells() for grid in grids),
         }
 
@@ -90,12 +131,13 @@ def with_vtk(root: str) -> dict:
 
 
 def main() -> int:
-    program, root = sys.argv[1:]
+    program, *roots = sys.argv[1:]
     # both print words of their own to standard output
     out = os.dup(1)
     os.dup2(2, 1)
-    found = with_lasso(root) if program == "lasso" else with_vtk(root)
-    os.write(out, (json.dumps(found) + "\n").encode())
+    for root in roots:
+        found = with_lasso(root) if program == "lasso" else with_vtk(root)
+        os.write(out, (json.dumps(found) + "\n").encode())
     return 0
 
 

@@ -3,4 +3,4 @@
 
 use libfuzzer_sys::fuzz_target;
 
-fuzz_target!(|bytes: &[u8]| d3plot_fuzz::read(d3plot_fuzz::split(bytes)));
+fuzz_target!(|bytes: &[u8]| d3plot_fuzz::family(bytes));

@@ -1,4 +1,4 @@
-//! What the fuzz targets share: reading everything a family has, and a limit on the memory that this may take.
+//! The fuzz targets, and what they share: reading everything a family has, and a limit on the memory that this may take.
 //!
 //! The limit is the promise of the crate: no more than twice the files' size at any moment, and a megabyte for what does
 //! not grow with the files. The files themselves are in memory here and are not counted.
@@ -38,9 +38,10 @@ unsafe impl GlobalAlloc for Counting {
 static ALLOCATOR: Counting = Counting;
 
 /// Opens a family of these files, reads all of it, and checks what must be true of any bytes.
-pub fn read(files: Vec<Vec<u8>>) {
+fn read(files: Vec<Vec<u8>>) {
     let size: usize = files.iter().map(Vec::len).sum();
-    let name = |number: usize| PathBuf::from(if number == 0 { "d3plot".to_owned() } else { format!("d3plot{number:02}") });
+    let name =
+        |number: usize| PathBuf::from(if number == 0 { "d3plot".to_owned() } else { format!("d3plot{number:02}") });
     let files: Vec<(PathBuf, Vec<u8>)> = files.into_iter().enumerate().map(|(n, bytes)| (name(n), bytes)).collect();
     let before = NOW.load(Relaxed);
     MOST.store(before, Relaxed);
@@ -91,6 +92,8 @@ fn everything(family: &Family, before: usize, size: usize) -> Result<(), Error> 
         }
         family.coordinates(state)?;
         family.deletion(state)?;
+        family.ranges(state)?;
+        check_memory(before, size, "ranges");
         for &part in &parts {
             let mut values: Vec<f32> = Vec::new();
             family.values_into(state, "coordinates", Rows::These(&family.nodes_of_part(part)), &mut values)?;
@@ -99,8 +102,49 @@ fn everything(family: &Family, before: usize, size: usize) -> Result<(), Error> 
     Ok(())
 }
 
+/// Target `family`: any bytes as the files of a family.
+pub fn family(bytes: &[u8]) {
+    read(split(bytes));
+}
+
+/// Target `header`: any control block in front of a sound geometry. The first byte chooses the family, then follow pairs of
+/// a word's place and its new value.
+pub fn header(bytes: &[u8]) {
+    let Some((&choice, changes)) = bytes.split_first() else { return };
+    let mut files = base(choice);
+    let word = word_size(choice);
+    for change in changes.chunks_exact(1 + word).take(40) {
+        let at = (usize::from(change[0]) % 128) * word;
+        if let Some(place) = files[0].get_mut(at..at + word) {
+            place.copy_from_slice(&change[1..]);
+        }
+    }
+    read(files);
+}
+
+/// Target `geometry`: a sound control block, any bytes behind it. The first byte chooses the family, the next two where the
+/// bytes go.
+pub fn geometry(bytes: &[u8]) {
+    let [choice, low, high, rest @ ..] = bytes else { return };
+    let mut files = base(*choice);
+    let root = &mut files[0];
+    let at = usize::from(u16::from_le_bytes([*low, *high])).min(root.len());
+    root.truncate(at.max(64 * word_size(*choice)));
+    root.extend(rest);
+    read(files);
+}
+
+/// Target `state`: a sound root, any bytes as the other members; the first byte chooses the family.
+pub fn state(bytes: &[u8]) {
+    let Some((&choice, rest)) = bytes.split_first() else { return };
+    let mut files = base(choice);
+    files.truncate(1);
+    files.extend(split(rest));
+    read(files);
+}
+
 /// Splits bytes into files at every four bytes `CUT!`.
-pub fn split(bytes: &[u8]) -> Vec<Vec<u8>> {
+fn split(bytes: &[u8]) -> Vec<Vec<u8>> {
     let mut files = Vec::new();
     let mut rest = bytes;
     while let Some(at) = rest.windows(4).position(|window| window == b"CUT!").filter(|_| files.len() < 40) {
@@ -113,22 +157,64 @@ pub fn split(bytes: &[u8]) -> Vec<Vec<u8>> {
 
 /// Sound families of testdata, with the bytes of a word.
 const BASES: [(usize, &[&[u8]]); 8] = [
-    (4, &[include_bytes!("../../crates/d3plot/testdata/s01_shells_latin1/d3plot"), include_bytes!("../../crates/d3plot/testdata/s01_shells_latin1/d3plot01")]),
-    (8, &[include_bytes!("../../crates/d3plot/testdata/s02_double_solids/d3plot"), include_bytes!("../../crates/d3plot/testdata/s02_double_solids/d3plot01")]),
-    (4, &[include_bytes!("../../crates/d3plot/testdata/s03_big_endian_mix/d3plot"), include_bytes!("../../crates/d3plot/testdata/s03_big_endian_mix/d3plot01")]),
-    (4, &[include_bytes!("../../crates/d3plot/testdata/s06_extra_penout/d3plot"), include_bytes!("../../crates/d3plot/testdata/s06_extra_penout/d3plot01")]),
-    (4, &[include_bytes!("../../crates/d3plot/testdata/s08_rigid_shells/d3plot"), include_bytes!("../../crates/d3plot/testdata/s08_rigid_shells/d3plot01")]),
-    (4, &[include_bytes!("../../crates/d3plot/testdata/x03_rigid_nodes/d3plot"), include_bytes!("../../crates/d3plot/testdata/x03_rigid_nodes/d3plot01")]),
-    (4, &[include_bytes!("../../crates/d3plot/testdata/x07_particles/d3plot"), include_bytes!("../../crates/d3plot/testdata/x07_particles/d3plot01")]),
+    (
+        4,
+        &[
+            include_bytes!("../../crates/d3plot/testdata/s01_shells_latin1/d3plot"),
+            include_bytes!("../../crates/d3plot/testdata/s01_shells_latin1/d3plot01"),
+        ],
+    ),
+    (
+        8,
+        &[
+            include_bytes!("../../crates/d3plot/testdata/s02_double_solids/d3plot"),
+            include_bytes!("../../crates/d3plot/testdata/s02_double_solids/d3plot01"),
+        ],
+    ),
+    (
+        4,
+        &[
+            include_bytes!("../../crates/d3plot/testdata/s03_big_endian_mix/d3plot"),
+            include_bytes!("../../crates/d3plot/testdata/s03_big_endian_mix/d3plot01"),
+        ],
+    ),
+    (
+        4,
+        &[
+            include_bytes!("../../crates/d3plot/testdata/s06_extra_penout/d3plot"),
+            include_bytes!("../../crates/d3plot/testdata/s06_extra_penout/d3plot01"),
+        ],
+    ),
+    (
+        4,
+        &[
+            include_bytes!("../../crates/d3plot/testdata/s08_rigid_shells/d3plot"),
+            include_bytes!("../../crates/d3plot/testdata/s08_rigid_shells/d3plot01"),
+        ],
+    ),
+    (
+        4,
+        &[
+            include_bytes!("../../crates/d3plot/testdata/x03_rigid_nodes/d3plot"),
+            include_bytes!("../../crates/d3plot/testdata/x03_rigid_nodes/d3plot01"),
+        ],
+    ),
+    (
+        4,
+        &[
+            include_bytes!("../../crates/d3plot/testdata/x07_particles/d3plot"),
+            include_bytes!("../../crates/d3plot/testdata/x07_particles/d3plot01"),
+        ],
+    ),
     (8, &[include_bytes!("../../crates/d3plot/testdata/x10_states_in_root/d3plot")]),
 ];
 
 /// A sound family, as its files.
-pub fn base(choice: u8) -> Vec<Vec<u8>> {
+fn base(choice: u8) -> Vec<Vec<u8>> {
     BASES[usize::from(choice) % BASES.len()].1.iter().map(|file| file.to_vec()).collect()
 }
 
 /// Bytes of its words.
-pub fn word_size(choice: u8) -> usize {
+fn word_size(choice: u8) -> usize {
     BASES[usize::from(choice) % BASES.len()].0
 }

@@ -1,11 +1,11 @@
 //! What `just bench-read` measures on our side; `benches/read_peers.py` runs it beside lasso-python.
 //!
 //! ```text
-//! cargo run --release -p d3plot --example measure -- make FOLDER     200k shells, 12 states, 400 MB
-//! cargo run --release -p d3plot --example measure -- many FOLDER     a family of 1,000 files
-//! cargo run --release -p d3plot --example measure -- read FOLDER     coordinates of all states against plain reading
-//! cargo run --release -p d3plot --example measure -- once FOLDER     opens and reads the coordinates once: for its memory
-//! cargo run --release -p d3plot --example measure -- open FOLDER     opening against `stat` on every file
+//! cargo run --release -p d3plot --example read_speed -- make FOLDER     200k shells, 12 states, 400 MB
+//! cargo run --release -p d3plot --example read_speed -- many FOLDER     a family of 1,000 files
+//! cargo run --release -p d3plot --example read_speed -- read FOLDER     coordinates of all states against plain reading
+//! cargo run --release -p d3plot --example read_speed -- once FOLDER     opens and reads the coordinates once: for its memory
+//! cargo run --release -p d3plot --example read_speed -- open FOLDER     opening against `stat` on every file
 //! ```
 
 use std::error::Error;

@@ -9,9 +9,10 @@ use crate::elements::Geometry;
 use crate::error::Error;
 use crate::geometry::{Reading, read_geometry};
 use crate::members::{Stream, member_number};
+use crate::motion::Motion;
 use crate::parts::{Part, assemble};
 use crate::quantity::{Quantity, quantities};
-use crate::rigid::uncertain_rigid_bodies;
+use crate::rigid::{UNCHECKED, uncertain_rigid_bodies};
 use crate::roots::roots;
 use crate::state::{Field, Layout, Variant};
 use crate::titles::{Titles, read_titles};
@@ -46,6 +47,8 @@ pub struct Family {
     pub(crate) quantities: Vec<Quantity>,
     /// Byte of the stream at which each state starts.
     pub(crate) starts: Vec<u64>,
+    /// NDIM 8, 9: how nodes of rigid bodies move, which the states leave out.
+    pub(crate) motion: Option<Motion>,
     header: Header,
     parts: Vec<Part>,
     times: Vec<f64>,
@@ -130,9 +133,6 @@ impl Family {
         }
         let titles = read_titles(&control, &stream, &reading, &mut warnings)?;
         let parts = assemble(&control, &mut reading, &titles, &stream, &mut warnings)?;
-        if let Some(active) = &reading.active {
-            warnings.push(Warning::RigidNodes { count: control.nodes.saturating_sub(active.len() as u64) });
-        }
         let (layout, walk) = locate(&control, &stream, &reading, &titles, &mut warnings)?;
         let Walk { starts, times, .. } = walk;
         if starts.is_empty() {
@@ -148,7 +148,28 @@ impl Family {
         }
         let header = header(&control, &titles, &layout);
         let quantities = quantities(&control);
-        Ok(Family { stream, control, reading, layout, quantities, starts, header, parts, times, members, warnings })
+        let motion = None;
+        let mut family = Family {
+            stream,
+            control,
+            reading,
+            layout,
+            quantities,
+            starts,
+            motion,
+            header,
+            parts,
+            times,
+            members,
+            warnings,
+        };
+        family.motion = Motion::of(&family)?;
+        if let Some(motion) = &family.motion {
+            let active = family.reading.active.as_ref().map_or(0, Vec::len) as u64;
+            let count = family.control.nodes.saturating_sub(active);
+            family.warnings.insert(0, Warning::RigidNodes { count, rates: motion.has_rates() });
+        }
+        Ok(family)
     }
 
     /// The root file.
@@ -296,7 +317,7 @@ fn refuse_uncertain(
     let contradicted = walk.warnings.iter().any(|warning| matches!(warning, Warning::UnreadTail { .. }));
     let confirmed = walk.confirmed > 0 || walk.starts.is_empty();
     if reading.rigid_bodies > 0 && (contradicted || !confirmed) {
-        return Err(uncertain_rigid_bodies(control, stream));
+        return Err(uncertain_rigid_bodies(control, stream, UNCHECKED));
     }
     if control.airbags > 0 && (contradicted || !confirmed) {
         return Err(uncertain_airbags(stream));

@@ -11,7 +11,7 @@ use crate::elements::{Beam, Geometry, Particle, Shell, Solid};
 use crate::error::Error;
 use crate::members::Stream;
 use crate::numbering::{Numbers, read_numbers};
-use crate::rigid::{Rigid, rigid_bodies, uncertain_rigid_bodies};
+use crate::rigid::{Rigid, UNCHECKED, rigid_bodies, uncertain_rigid_bodies};
 
 /// The float that ends the geometry and the states of a member.
 pub(crate) const END_MARK: f64 = -999_999.0;
@@ -36,6 +36,8 @@ pub(crate) struct Reading {
     /// NDIM 8, 9: the nodes, from 0, that the nodal blocks hold.
     pub(crate) active: Option<Vec<u32>>,
     pub(crate) rigid_bodies: u64,
+    /// NDIM 8, 9: for each node its body, from 0, or [`NO_BODY`](crate::rigid::NO_BODY).
+    pub(crate) body_of: Vec<u32>,
     /// NDIM 8, 9: every node is either in a rigid body or active.
     pub(crate) rigid_and_active_are_all: bool,
     pub(crate) road_surfaces: u64,
@@ -119,14 +121,14 @@ fn the_certain_one(control: &Control, stream: &Stream, choices: &[Choice]) -> Re
         }
         let same = |other: &Reading| (&other.active, other.rigid_shells) == (&reading.active, reading.rigid_shells);
         if certain.as_ref().is_some_and(|(_, other)| !same(other)) {
-            return Err(uncertain_rigid_bodies(control, stream));
+            return Err(uncertain_rigid_bodies(control, stream, UNCHECKED));
         }
         certain = certain.or(Some((choice, reading)));
     }
     match (certain, first_error) {
         (Some((choice, _)), _) => Ok(choice),
         (None, Some(error)) if read == 0 => Err(error),
-        (None, _) => Err(uncertain_rigid_bodies(control, stream)),
+        (None, _) => Err(uncertain_rigid_bodies(control, stream, UNCHECKED)),
     }
 }
 
@@ -196,6 +198,7 @@ fn read_sections(control: &Control, stream: &Stream, choice: Choice, cursor: &mu
         airbags,
         active: rigid.active,
         rigid_bodies: rigid.bodies,
+        body_of: rigid.body_of,
         rigid_and_active_are_all: rigid.complete,
         road_surfaces,
         end,

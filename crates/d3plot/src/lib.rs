@@ -42,9 +42,11 @@ mod rigid;
 mod titles;
 
 // the states
+mod motion;
 mod quantity;
 mod ranges;
 mod results;
+mod rotation;
 mod series;
 mod state;
 mod strain;
@@ -71,5 +73,5 @@ pub use values::{Layers, Real, Rows};
 pub use warning::Warning;
 pub use words::{ByteOrder, Precision};
 pub use write::{
-    Content, Copied, DeletionTable, Positions, StateWriter, Stored, Thermal, WordsEach, WriteOptions, Writer,
+    Content, Copied, DeletionTable, Keep, Positions, StateWriter, Stored, Thermal, WordsEach, WriteOptions, Writer,
 };

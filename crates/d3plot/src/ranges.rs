@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::family::Family;
+use crate::values::Rows;
 
 /// The range of a field over everything that the state stores of it: all layers of all elements, deleted ones included,
 /// rigid ones that have no words not.
@@ -32,7 +33,7 @@ pub struct Component {
 
 impl Family {
     /// The range of every field of a state, but `time`, `globals` and the tables of elements as a whole, whose quantities are
-    /// listed instead. `coordinates` are positions; nodes of rigid bodies that the states leave out stand where they start.
+    /// listed instead. `coordinates` are positions of all nodes, those of rigid bodies that the states leave out too.
     ///
     /// # Errors
     /// As [`Family::coordinates`].
@@ -63,22 +64,11 @@ impl Family {
         };
         let mut values: Vec<f64> = Vec::new();
         if name == "coordinates" {
-            self.values_into(state, name, crate::values::Rows::All, &mut values)?;
-            let left_out = self.reading.active.as_ref().map(|active| {
-                let mut left_out = vec![true; self.geometry().coordinates.len()];
-                active.iter().for_each(|&node| left_out[node as usize] = false);
-                left_out
-            });
-            for (node, position) in values.chunks_exact(width).enumerate() {
-                let at_start = left_out.as_ref().is_some_and(|left_out| left_out[node]);
-                for (at, &value) in position.iter().enumerate() {
-                    take(at, if at_start { self.geometry().coordinates[node][at] } else { value });
-                }
-            }
+            self.values_into(state, name, Rows::All, &mut values)?;
         } else {
             self.stored_values(state, &access, &mut values)?;
-            values.iter().enumerate().for_each(|(at, &value)| take(at, value));
         }
+        values.iter().enumerate().for_each(|(at, &value)| take(at, value));
         Ok(Range { name, points, components, not_finite })
     }
 }

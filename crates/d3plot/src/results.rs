@@ -41,8 +41,8 @@ pub struct Deletion {
 
 impl Family {
     /// Positions of the nodes in a state, N × 3 in the model's length unit: always positions, also where the file holds
-    /// displacements. `None` if the states have neither (IU = 0). NaN for nodes of rigid bodies that the states leave
-    /// out (NDIM 8, 9).
+    /// displacements. `None` if the states have neither (IU = 0). Nodes of rigid bodies that the states leave
+    /// out (NDIM 8, 9) are where the motion of their body puts them.
     ///
     /// # Errors
     /// [`Error::NoSuchState`], [`Error::Changed`], [`Error::Io`]: as every read of a state.

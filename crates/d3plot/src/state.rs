@@ -25,7 +25,7 @@ use crate::geometry::Reading;
 ///   `thick_shell_internal_energy`;
 /// - `solid_stress`, `solid_plastic_strain`, `solid_history`, `solid_strain`;
 /// - `beam_axial_force`, `beam_shear_force`, `beam_bending_moment`, `beam_torsion_moment`, and for each integration point
-///   `beam_shear_stress`, `beam_axial_stress`, `beam_plastic_strain`, `beam_axial_strain`.
+///   `beam_axial_stress`, `beam_shear_stress`, `beam_plastic_strain`, `beam_axial_strain`.
 ///
 /// Components of stress and strain: xx, yy, zz, xy, yz, zx. Units are those of the run; the file does not tell them.
 #[derive(Debug, Clone, PartialEq, Eq)]

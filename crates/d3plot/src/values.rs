@@ -7,6 +7,7 @@ use std::ops::Range;
 
 use crate::error::Error;
 use crate::family::Family;
+use crate::motion::leaves_out_rigid_nodes;
 use crate::quantity::Quantity;
 use crate::results::Table;
 use crate::state::Field;
@@ -139,8 +140,8 @@ impl Access {
 
 impl Family {
     /// Values of a field of [`Family::fields`] in a state: a table of the state, or a quantity of elements such as
-    /// `shell_stress`, all its points. One row a node or element of the geometry: NaN for rigid shells and for nodes of
-    /// rigid bodies that the states leave out. `coordinates` are positions also where the file has displacements. `None` if
+    /// `shell_stress`, all its points. One row a node or element of the geometry: NaN for rigid shells. Nodes of
+    /// rigid bodies that the states leave out are put where their bodies are. `coordinates` are positions also where the file has displacements. `None` if
     /// the states have no field of that name.
     ///
     /// ```
@@ -255,6 +256,11 @@ impl Family {
                 self.scattered(start, access, rows.iter().map(place), into)?;
             }
         }
+        if let Some(motion) =
+            self.motion.as_ref().filter(|_| stored.is_some() && leaves_out_rigid_nodes(access.table()))
+        {
+            motion.fill(self, state, access.table(), rows, into)?;
+        }
         if access.from_start {
             self.add_starts(rows, columns, into);
         }
@@ -317,9 +323,7 @@ impl Family {
     /// and rigid shells.
     fn stored_rows(&self, field: &Field) -> Result<Option<Vec<Option<u32>>>, Error> {
         match (field.name, &self.reading.active) {
-            ("coordinates" | "displacement" | "velocity" | "acceleration", Some(active))
-                if field.rows != self.control.nodes =>
-            {
+            (name, Some(active)) if leaves_out_rigid_nodes(name) && field.rows != self.control.nodes => {
                 let mut places = vec![None; self.geometry().coordinates.len()];
                 for (place, &node) in (0_u32..).zip(active) {
                     places[node as usize] = Some(place);

@@ -91,10 +91,12 @@ pub enum Warning {
         /// What was read differently.
         reason: String,
     },
-    /// The states leave out nodes of rigid bodies (NDIM 8, 9): their results are NaN.
+    /// The states leave out nodes of rigid bodies (NDIM 8, 9): their positions are rebuilt from the motion of the bodies.
     RigidNodes {
         /// How many nodes.
         count: u64,
+        /// Whether velocity and acceleration are rebuilt, too; they are NaN if not.
+        rates: bool,
     },
     /// There is no whole state in the family.
     NoStates,
@@ -169,10 +171,14 @@ impl fmt::Display for Warning {
             Warning::StateSize { declared, used, reason } => {
                 write!(f, "a state has {declared} words by the control block but {used} by the end marks: {reason}")
             }
-            Warning::RigidNodes { count } => {
+            Warning::RigidNodes { count, rates } => {
+                let (positions, others) = match rates {
+                    true => ("results", ""),
+                    false => ("positions", "; velocity and acceleration of these are NaN"),
+                };
                 write!(
                     f,
-                    "the states leave out {count} nodes of rigid bodies: coordinates, velocity and acceleration of these are NaN, not rebuilt"
+                    "the states leave out {count} nodes of rigid bodies: their {positions} are rebuilt from the motion of the bodies{others}"
                 )
             }
             Warning::NoStates => f.write_str("the family has no whole state"),

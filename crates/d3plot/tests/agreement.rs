@@ -131,14 +131,10 @@ fn summary(family: &Family) -> Map<String, Value> {
     }
 }
 
-/// The generator leaves nodes of rigid bodies where they start; the states do not tell.
-fn rigid_at_start(family: &Family, mut positions: Vec<[f64; 3]>) -> Vec<[f64; 3]> {
-    for (position, start) in positions.iter_mut().zip(&family.geometry().coordinates) {
-        if position[0].is_nan() {
-            *position = *start;
-        }
-    }
-    positions
+/// The vectors that the file holds: without those of rigid bodies that are rebuilt.
+fn stored(family: &Family, state: usize, field: &str) -> Option<Vec<[f64; 3]>> {
+    let table = family.table(state, field).unwrap()?;
+    Some(table.rows().map(|row| [row[0], row[1], row[2]]).collect())
 }
 
 /// The expected lists leave SPH out.
@@ -149,9 +145,9 @@ fn has_elements(part: &Part) -> bool {
 fn state(family: &Family, state: usize) -> Value {
     let mut found = json!({ "time": family.times()[state], "coordinates": null });
     let all = [
-        ("coordinates", family.coordinates(state).unwrap().map(|positions| rigid_at_start(family, positions))),
-        ("velocity", family.velocity(state).unwrap()),
-        ("acceleration", family.acceleration(state).unwrap()),
+        ("coordinates", family.coordinates(state).unwrap()),
+        ("velocity", stored(family, state, "velocity")),
+        ("acceleration", stored(family, state, "acceleration")),
     ];
     for (key, values) in all {
         if let Some(values) = values {
@@ -192,8 +188,7 @@ fn vectors(values: &[[f64; 3]]) -> Value {
 }
 
 fn columns(values: &[f64], columns: usize) -> Value {
-    // NaN: nodes of rigid bodies that the states leave out
-    let column = |at: usize| values.iter().skip(at).step_by(columns).copied().filter(|value| !value.is_nan());
+    let column = |at: usize| values.iter().skip(at).step_by(columns).copied();
     let each = |fold: &dyn Fn(usize) -> f64| (0..columns).map(fold).collect::<Vec<f64>>();
     json!({
         "min": each(&|at| column(at).fold(f64::INFINITY, f64::min)),

@@ -347,3 +347,25 @@ fn nothing_is_overwritten_and_what_does_not_fit_is_refused() {
     says(refused(&wrong, Content::default()), "4 user numbers for 5 shells");
     assert!(!fresh.exists());
 }
+
+#[test]
+fn by_default_nothing_runs_on() {
+    // more than 7 × 512 × 512 words of geometry, and of a state: other programs lose their way where these run on
+    let (nx, ny) = (500_u32, 320_u32);
+    let mut geometry = Geometry::default();
+    geometry.coordinates = (0..nx * ny).map(|k| [f64::from(k % nx), f64::from(k / nx), 0.0]).collect();
+    let corners = (0..nx * (ny - 1)).filter(|k| k % nx + 1 < nx);
+    geometry.shells = corners.map(|k| Shell { nodes: [k, k + 1, k + nx + 1, k + nx], part: 0 }).collect();
+    let content = Content { velocity: true, acceleration: true, layers: 3, stress: Stored::All, ..Content::default() };
+    let place = tempfile::tempdir().unwrap();
+    let root = place.path().join("d3plot");
+    let options = WriteOptions::default();
+    let mut writer = Writer::create(&root, &geometry, &[Part::new(1, "sheet")], &content, &options).unwrap();
+    assert!(writer.words_per_state() > 7 * 512 * 512);
+    (0..2).for_each(|k| writer.state(f64::from(k)).write().unwrap());
+    writer.finish().unwrap();
+    let family = Family::open(&root).unwrap();
+    assert_eq!((family.times(), family.warnings()), (&[0.0, 1.0][..], &[][..]));
+    let states: Vec<usize> = family.members().iter().map(|member| member.states).collect();
+    assert_eq!(states, [0, 1, 1]);
+}

@@ -27,12 +27,16 @@ pub(crate) struct Convert {
     /// Byte order: little or big [default: little]
     #[arg(long, value_name = "ORDER")]
     byte_order: Option<String>,
-    /// The most bytes of a file; what is longer runs on into the next [default: the solver's, 7 × 512 × 512 words]
+    /// The most bytes of a file; what is longer runs on into the next, which few programs read [default: the solver's, 7 × 512 × 512 words, or what one state needs]
     #[arg(long, value_name = "BYTES", value_parser = clap::value_parser!(u64).range(4096..))]
     file_bytes: Option<u64>,
     /// The most states of a file [default: as many as fit]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     file_states: Option<u32>,
+    /// Keep also what other programs misread: mass scaling, heat flux, residual forces, contact words, histories of beams, tensors of
+    /// plastic and thermal strain, displacements as such, rigid shells without words. What is left out is named
+    #[arg(long)]
+    everything: bool,
     /// Map the files into memory. Only for files that nothing writes to: if one becomes shorter meanwhile, this program ends
     /// by a signal, where plain reading gives an error
     #[arg(long)]
@@ -53,6 +57,7 @@ impl Convert {
             big_endian: one_of("--byte-order", &self.byte_order, ["little", "big"])?.unwrap_or(false),
             file_bytes: self.file_bytes,
             file_states: self.file_states.map(|states| states as usize),
+            everything: self.everything,
         };
         let run = Run::open_mapped("", &self.run, self.map)?;
         for warning in run.warnings() {

@@ -37,6 +37,12 @@ impl Spoilt {
         fs::write(path, content).unwrap();
     }
 
+    /// Another value for a word of the control block.
+    pub fn poke(self, word: usize, value: i32) -> Self {
+        self.change("d3plot", 4 * word, &value.to_le_bytes());
+        self
+    }
+
     /// Shortens a file of the family to `bytes`.
     pub fn cut(self, file: &str, bytes: u64) -> Self {
         let file = OpenOptions::new().write(true).open(self.folder.join(file)).unwrap();
@@ -56,10 +62,7 @@ impl Spoilt {
 
     /// Makes the x coordinate of node number `node` (counted from 0) in the first state of `file` NaN.
     pub fn break_coordinate(self, file: &str, node: usize) -> Self {
-        assert!(node < self.word(16));
-        let coordinates = 1 + self.word(18);
-        self.change(file, 4 * (coordinates + 3 * node), &f32::NAN.to_le_bytes());
-        self
+        self.move_node(file, node, f32::NAN)
     }
 
     /// Moves a node in the first state of `file`: the same mesh, another content.

@@ -15,10 +15,12 @@ pub struct ConvertOptions {
     pub double: Option<bool>,
     /// The highest byte of a word first.
     pub big_endian: bool,
-    /// The most bytes of a file; `None` for the solver's default.
+    /// The most bytes of a file; `None` for the solver's default, or as many as one state needs.
     pub file_bytes: Option<u64>,
     /// The most states of a file; `None` for as many as fit.
     pub file_states: Option<usize>,
+    /// Keep also what other programs misread (see [`d3plot::Keep`]).
+    pub everything: bool,
 }
 
 /// What was written.
@@ -26,7 +28,7 @@ pub struct ConvertOptions {
 pub struct Converted {
     /// Whole states.
     pub states: usize,
-    /// Tables that could not be written.
+    /// What was left out.
     pub left_out: Vec<&'static str>,
 }
 
@@ -60,7 +62,8 @@ impl Run {
             release: header.release.clone(),
             ..d3plot::WriteOptions::default()
         };
-        let copied = family.copy(root, &write, |states| {
+        let keep = if options.everything { d3plot::Keep::Everything } else { d3plot::Keep::WidelyRead };
+        let copied = family.copy(root, keep, &write, |states| {
             watch.step("states", states, family.times().len());
             !watch.stopped()
         })?;

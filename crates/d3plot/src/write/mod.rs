@@ -14,7 +14,7 @@ mod state;
 use std::path::Path;
 
 pub use content::{Content, DeletionTable, Positions, Stored, Thermal, WordsEach};
-pub use copy::Copied;
+pub use copy::{Copied, Keep};
 pub use state::StateWriter;
 
 use crate::control::Control;
@@ -41,7 +41,8 @@ pub struct WriteOptions {
     /// Byte order.
     pub byte_order: ByteOrder,
     /// The most bytes of a file, rounded down to whole blocks of 512 words: geometry and states that are longer run on
-    /// into the next one. `None` for the solver's default, 7 × 512 × 512 words.
+    /// into the next one, which few programs read. `None` for the solver's default, 7 × 512 × 512 words, or as many as the
+    /// geometry or one state needs: nothing runs on then.
     pub member_bytes: Option<u64>,
     /// The most states of a file; `None` for as many as fit.
     pub member_states: Option<usize>,
@@ -148,9 +149,12 @@ impl Writer {
             .filter(|layout| usize::try_from(layout.words * words.size()).is_ok())
             .ok_or_else(|| unfit("a state of more bytes than can be counted".to_owned()))?;
 
-        let solvers_default = 7 * 512 * 512 * words.size();
-        let limit = options.member_bytes.unwrap_or(solvers_default);
-        let mut members = Members::create(root, limit, BLOCK * words.size())?;
+        let block = BLOCK * words.size();
+        let whole = |bytes: u64| bytes.saturating_add(words.size()).next_multiple_of(block); // with an end mark
+        let solvers_default = 7 * 512 * block;
+        let (geometry_bytes, state_bytes) = (encoded.bytes.len() as u64, layout.words * words.size());
+        let default = solvers_default.max(whole(geometry_bytes)).max(whole(state_bytes));
+        let mut members = Members::create(root, options.member_bytes.unwrap_or(default), block)?;
         members.put(&encoded.bytes)?;
         let mut writer = Writer {
             members,
@@ -180,6 +184,11 @@ impl Writer {
     /// States written so far.
     pub fn states(&self) -> usize {
         self.states
+    }
+
+    /// Words a row of a table has, if the states hold it.
+    fn columns(&self, table: &str) -> Option<usize> {
+        self.layout.field(table).map(|field| field.columns as usize)
     }
 
     /// Words of a state.
