@@ -5,11 +5,11 @@
 //! everything else stays in the first-level cache, so that a search takes about as long as its numbers take to come from
 //! memory (docs/performance.md). Sums are in double precision: cosines of coordinates differ in the sixth digit and beyond.
 //!
-//! The loop is written once and compiled twice; with fused multiply-add where the processor has it. A row's sums are
-//! always added in the same order, alone or among others, so that every command gives one run the same number.
+//! The loop is there twice: for AVX2, two rows at a time, and for any processor. A row's sums are always added in the
+//! same order, alone or among others, so that every command gives one run the same number.
 
-/// Numbers that are worked on at a time: one register of AVX-512, two of AVX2.
-const LANES: usize = 8;
+/// Numbers that are worked on at a time: one register of AVX2 in double precision.
+const LANES: usize = 4;
 
 type Lanes = [f64; LANES];
 
@@ -17,7 +17,9 @@ type Lanes = [f64; LANES];
 pub(super) type Sums = [f64; 2];
 
 /// Bytes from a row to what is asked for ahead of it: about the time that memory takes to answer.
+#[cfg(target_arch = "x86_64")]
 const AHEAD: usize = 4096;
+#[cfg(target_arch = "x86_64")]
 const LINE: usize = 64;
 
 /// What is compared of one slice of stored coefficients, by whole lanes. The last lanes are those of the row's end, with
@@ -72,16 +74,10 @@ impl Slice {
             return;
         }
         #[cfg(target_arch = "x86_64")]
-        {
-            #[target_feature(enable = "avx2,fma")]
-            fn avx2<const COSINE: bool>(slice: &Slice, values: &[f32], sums: &mut [Sums]) {
-                slice.add_with::<COSINE, true>(values, sums);
-            }
-            if fused() {
-                // SAFETY: ordinary safe code; calling it is unsafe only because it uses instructions that the line
-                // before has found on this processor.
-                return unsafe { avx2::<COSINE>(self, values, sums) };
-            }
+        if fused() && self.width >= LANES {
+            // SAFETY: ordinary safe code; calling it is unsafe only because it uses instructions that the line before has
+            // found on this processor.
+            return unsafe { self.add_avx2::<COSINE>(values, sums) };
         }
         if fused() {
             self.add_with::<COSINE, true>(values, sums);
@@ -90,13 +86,9 @@ impl Slice {
         }
     }
 
-    // Inlined by force, and without closures: only what stands in the function that names them is compiled for the
-    // instructions it names.
-    #[inline(always)]
     fn add_with<const COSINE: bool, const FUSED: bool>(&self, values: &[f32], sums: &mut [Sums]) {
         let Some((last, whole)) = self.numbers.split_last() else { return };
         for (row, sums) in values.chunks_exact(self.width).zip(sums) {
-            ask_ahead(row);
             let (mut first, mut second) = ([0.0; LANES], [0.0; LANES]);
             for (x, numbers) in row.as_chunks::<LANES>().0.iter().zip(whole) {
                 numbers.add::<COSINE, FUSED>(x, &mut first, &mut second);
@@ -109,30 +101,109 @@ impl Slice {
             sums[1] += total(second);
         }
     }
+
+    /// The same, number by number, two rows at a time: what is compared with is loaded once for both.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma")]
+    fn add_avx2<const COSINE: bool>(&self, values: &[f32], sums: &mut [Sums]) {
+        let mut pairs = sums.chunks_exact_mut(2);
+        for (rows, sums) in values.chunks_exact(2 * self.width).zip(&mut pairs) {
+            ask_ahead(rows);
+            let (one, other) = rows.split_at(self.width);
+            let [of_one, of_other] = self.pair::<COSINE>(one, other);
+            sums[0] = [sums[0][0] + of_one[0], sums[0][1] + of_one[1]];
+            sums[1] = [sums[1][0] + of_other[0], sums[1][1] + of_other[1]];
+        }
+        if let [odd] = pairs.into_remainder() {
+            let row = &values[values.len() - self.width..];
+            let [of, _] = self.pair::<COSINE>(row, row);
+            *odd = [odd[0] + of[0], odd[1] + of[1]];
+        }
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma")]
+    #[inline]
+    fn pair<const COSINE: bool>(&self, one: &[f32], other: &[f32]) -> [Sums; 2] {
+        use std::arch::x86_64::{
+            __m128d, __m256d, _mm_add_pd, _mm_cvtsd_f64, _mm_unpackhi_pd, _mm256_castpd256_pd128,
+            _mm256_extractf128_pd, _mm256_hadd_pd,
+        };
+        let ends = [one.last_chunk(), other.last_chunk()];
+        let (Some((last, whole)), [Some(end), Some(other_end)]) = (self.numbers.split_last(), ends) else {
+            return Default::default();
+        };
+        let mut pair = Pair::zero();
+        for ((x, y), numbers) in one.as_chunks().0.iter().zip(other.as_chunks().0).zip(whole) {
+            pair.add::<COSINE>(numbers, x, y);
+        }
+        pair.add::<COSINE>(last, end, other_end);
+        let Pair { firsts, seconds } = pair;
+        // (a₀ + a₁) + (a₂ + a₃) of both sums at once, as `total` adds them.
+        let totals = |first: __m256d, second: __m256d| -> Sums {
+            let pairs = _mm256_hadd_pd(first, second);
+            let sums: __m128d = _mm_add_pd(_mm256_castpd256_pd128(pairs), _mm256_extractf128_pd::<1>(pairs));
+            [_mm_cvtsd_f64(sums), _mm_cvtsd_f64(_mm_unpackhi_pd(sums, sums))]
+        };
+        [totals(firsts[0], seconds[0]), totals(firsts[1], seconds[1])]
+    }
+}
+
+/// Lanes of the sums of two rows.
+#[cfg(target_arch = "x86_64")]
+#[derive(Clone, Copy)]
+struct Pair {
+    firsts: [std::arch::x86_64::__m256d; 2],
+    seconds: [std::arch::x86_64::__m256d; 2],
+}
+
+#[cfg(target_arch = "x86_64")]
+impl Pair {
+    #[target_feature(enable = "avx2,fma")]
+    #[inline]
+    fn zero() -> Self {
+        let zero = std::arch::x86_64::_mm256_setzero_pd();
+        Self { firsts: [zero; 2], seconds: [zero; 2] }
+    }
+
+    /// [`Numbers::add`] for a number of either row.
+    #[target_feature(enable = "avx2,fma")]
+    #[inline]
+    fn add<const COSINE: bool>(&mut self, numbers: &Numbers, one: &[f32; LANES], other: &[f32; LANES]) {
+        use std::arch::x86_64::{_mm_setr_ps, _mm256_cvtps_pd, _mm256_fmadd_pd, _mm256_setr_pd, _mm256_sub_pd};
+        let double = |[a, b, c, d]: Lanes| _mm256_setr_pd(a, b, c, d);
+        let (factor, offset, target) = (double(numbers.factor), double(numbers.offset), double(numbers.target));
+        for (row, &[a, b, c, d]) in [one, other].into_iter().enumerate() {
+            let v = _mm256_fmadd_pd(factor, _mm256_cvtps_pd(_mm_setr_ps(a, b, c, d)), offset);
+            if COSINE {
+                self.firsts[row] = _mm256_fmadd_pd(target, v, self.firsts[row]);
+                self.seconds[row] = _mm256_fmadd_pd(v, v, self.seconds[row]);
+            } else {
+                let off = _mm256_sub_pd(target, v);
+                self.firsts[row] = _mm256_fmadd_pd(off, off, self.firsts[row]);
+            }
+        }
+    }
 }
 
 /// A row of fewer numbers than lanes.
-#[inline(never)]
 fn filled_up(row: &[f32]) -> [f32; LANES] {
     std::array::from_fn(|lane| row.get(lane).copied().unwrap_or(0.0))
 }
 
-/// Asks for the numbers that come [`AHEAD`] of a row, so that they are there when their row comes.
+/// Asks for the numbers that come [`AHEAD`] of these, so that they are there when their row comes.
+#[cfg(target_arch = "x86_64")]
 #[inline(always)]
-fn ask_ahead(row: &[f32]) {
-    #[cfg(target_arch = "x86_64")]
-    for line in 0..(4 * row.len()).div_ceil(LINE) {
-        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-        let ahead = row.as_ptr().cast::<i8>().wrapping_add(AHEAD + line * LINE);
+fn ask_ahead(rows: &[f32]) {
+    use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+    for line in 0..(4 * rows.len()).div_ceil(LINE) {
+        let ahead = rows.as_ptr().cast::<i8>().wrapping_add(AHEAD + line * LINE);
         // SAFETY: a prefetch of any address reads nothing and cannot fault.
         unsafe { _mm_prefetch::<_MM_HINT_T0>(ahead) };
     }
-    #[cfg(not(target_arch = "x86_64"))]
-    let _ = (row, AHEAD, LINE);
 }
 
 impl Numbers {
-    #[inline(always)]
     fn add<const COSINE: bool, const FUSED: bool>(&self, x: &[f32; LANES], first: &mut Lanes, second: &mut Lanes) {
         for lane in 0..LANES {
             let v = fma::<FUSED>(self.factor[lane], f64::from(x[lane]), self.offset[lane]);
@@ -148,19 +219,13 @@ impl Numbers {
 }
 
 /// a·b + c, rounded once where it is fused.
-#[inline(always)]
 fn fma<const FUSED: bool>(a: f64, b: f64, c: f64) -> f64 {
     if FUSED { a.mul_add(b, c) } else { a * b + c }
 }
 
 /// Sum of the lanes, always in the same order.
-#[inline(always)]
-fn total(lanes: Lanes) -> f64 {
-    let mut halves = [0.0; LANES / 2];
-    for lane in 0..LANES / 2 {
-        halves[lane] = lanes[lane] + lanes[lane + LANES / 2];
-    }
-    (halves[0] + halves[2]) + (halves[1] + halves[3])
+fn total([a, b, c, d]: Lanes) -> f64 {
+    (a + b) + (c + d)
 }
 
 /// Whether a product and a sum are rounded once.
@@ -254,10 +319,13 @@ mod tests {
                 let close = |a: f64, b: f64| (a - b).abs() < 1e-10;
                 assert!((0..2).all(|at| close(cosine[row][at], expected[at]) && close(plain[row][at], expected[at])));
                 assert!(close(distance[row][0], off), "{width}");
-                // One row alone has the same bits.
-                let mut alone = [[0.0; 2]];
-                slice.add::<true>(&values[row * width..(row + 1) * width], &mut alone);
+                // One row alone has the same bits, and the other loop gives them too where it rounds as often.
+                let (mut alone, mut other) = ([[0.0; 2]], [[0.0; 2]]);
+                let row_values = &values[row * width..(row + 1) * width];
+                slice.add::<true>(row_values, &mut alone);
+                slice.add_with::<true, true>(row_values, &mut other);
                 assert_eq!(alone[0], cosine[row]);
+                assert!(other[0] == cosine[row] || !fused(), "{width}");
             }
         }
     }
