@@ -29,6 +29,7 @@
 //! | how alike | [`similarity`] | a descriptor, coefficients | a ranking |
 //! | from which similarity on | [`calibrate`] | a descriptor, known runs | a threshold, its error rates |
 //! | which mode, or none | [`classify`] | modes, a state | [`classify::Verdict`] |
+//! | does the surface stretch | [`isometry`] | a state | strains, shift of the eigenvalues |
 //! | why they are alike | [`explain`] | two states | terms, regions, words |
 //! | a run that is being computed | [`monitor`] | states as they come | on the target's path or not |
 //! | judged against labels | [`compare`] | labels | precision, average precision |
@@ -52,6 +53,7 @@ pub mod feature_table;
 pub mod features;
 pub mod field;
 pub mod inputs;
+pub mod isometry;
 pub mod joints;
 pub mod modes;
 pub mod monitor;
