@@ -79,6 +79,17 @@ bench-read repeats="3":
     cargo build --release -p d3plot --example read_speed
     python3 benches/read_peers.py target/release/examples/read_speed --scratch target/bench-read --repeats {{ repeats }}
 
+# projecting a bundle beside reading its files alone, and beside lasso-python + NumPy doing the same
+bench-projection bundle="examples/hat-section/runs" repeats="3":
+    cargo build --release
+    python3 benches/projection.py {{ bundle }} --repeats {{ repeats }}
+
+# a search of a million descriptors of 51 numbers beside plain reading from memory; 4 GB below target/
+bench-search folder="target/bench-search":
+    cargo build --release -p crumple --example search_speed
+    test -d {{ folder }}/study || target/release/examples/search_speed make {{ folder }}
+    target/release/examples/search_speed time {{ folder }}
+
 # the table of docs/reading.md: every test family read by us, lasso-python, VTK and dynars (the last: pip install dynars)
 read-table:
     cargo build --release

@@ -27,9 +27,33 @@ impl Points {
     /// Runs as points: `per_run` consecutive rows are one run.
     pub(super) fn of(by: By, rows: &Coefficients, per_run: usize, basis: &Basis) -> Self {
         match by {
-            By::Rotation => Self::by_rotation(rows, per_run, &Ruler::of(basis)),
-            By::Displacement | By::Coordinates | By::Field(_) => Self::in_lengths(rows, per_run, basis.total_mass()),
+            By::Rotation | By::RotationAnd(_) => Self::by_rotation(rows, per_run, &Ruler::of(basis)),
+            By::Displacement | By::DisplacementAnd(_) | By::Coordinates | By::Field(_) => {
+                Self::in_lengths(rows, per_run, basis.total_mass())
+            }
         }
+    }
+
+    /// Points of the same runs as one: each kind over its spread, so that a field in its own unit says as much as the
+    /// shape. A kind that is the same for all runs says nothing.
+    pub(super) fn together(mut each: Vec<Self>) -> Self {
+        if each.len() == 1 {
+            return each.remove(0);
+        }
+        let count = each.iter().map(Self::count).min().unwrap_or(0);
+        let all: Vec<usize> = (0..count).collect();
+        let factor = |points: &Self| {
+            let square = points.distances_to_mean(&all).iter().map(|d| d * d).sum::<f64>() / count.max(1) as f64;
+            if square > 0.0 { 1.0 / square.sqrt() } else { 0.0 }
+        };
+        let factors: Vec<f64> = each.iter().map(factor).collect();
+        let row = |run: &usize| {
+            let scaled =
+                each.iter().zip(&factors).map(|(points, factor)| points.point(*run).iter().map(move |x| x * factor));
+            scaled.flatten().collect::<Vec<f64>>()
+        };
+        let values = all.iter().flat_map(row).collect();
+        Self { count, width: each.iter().map(|points| points.width).sum(), values }
     }
 
     /// One row a run, coefficients in RMS lengths.
