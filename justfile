@@ -79,10 +79,14 @@ bench-read repeats="3":
     cargo build --release -p d3plot --example read_speed
     python3 benches/read_peers.py target/release/examples/read_speed --scratch target/bench-read --repeats {{ repeats }}
 
-# projecting a bundle beside reading its files alone, and beside lasso-python + NumPy doing the same
-bench-projection bundle="examples/hat-section/runs" repeats="3":
+# projecting a bundle beside reading its files alone, and beside lasso-python + NumPy doing the same: the example, whose
+# files hold little beside positions, and runs with all that a solver writes
+bench-projection repeats="3":
     cargo build --release
-    python3 benches/projection.py {{ bundle }} --repeats {{ repeats }}
+    cargo build --release -p d3plot --example read_speed
+    target/release/examples/read_speed bundle target/bench-projection
+    python3 benches/projection.py examples/hat-section/runs --repeats {{ repeats }}
+    python3 benches/projection.py target/bench-projection --repeats {{ repeats }} --join ""
 
 # a search of a million descriptors of 51 numbers beside plain reading from memory; 4 GB below target/
 bench-search folder="target/bench-search":

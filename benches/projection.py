@@ -89,7 +89,8 @@ def main() -> None:
     shutil.rmtree(args.scratch, ignore_errors=True)
     args.scratch.mkdir(parents=True)
     first = files_of(args.bundle)[0]
-    make = [args.crumple, "init", study, "--reference", first, "--join", args.join, "-K", args.eigenpairs, "--quiet"]
+    make = [args.crumple, "init", study, "--reference", first, "-K", args.eigenpairs, "--quiet"]
+    make += ["--join", args.join] if args.join else []
     subprocess.run(make, check=True, stdout=subprocess.DEVNULL)
     own = [sys.executable, str(HERE / "projection.py"), str(args.bundle), "--scratch", str(args.scratch), "--only"]
     ours = [str(args.crumple), "add", str(copy), str(args.bundle), "--json", "--quiet"]
