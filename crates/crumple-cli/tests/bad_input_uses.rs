@@ -29,7 +29,7 @@ const OF_A_DESCRIPTOR: [&str; 8] = [
     "verify STUDY FILE --calibrate",
     "distance STUDY FILE run_001",
     "features STUDY FILE",
-    "monitor STUDY FILE RUN --timeout 1",
+    "monitor STUDY FILE RUN --timeout 1 --tolerance 0.1",
     "reconstruct STUDY run_001 --descriptor FILE -o OUT",
     "export STUDY --descriptor FILE -o OUT",
 ];
@@ -104,7 +104,7 @@ fn a_run_without_the_part() {
         "classify STUDY RUN",
         "explain STUDY run_007 RUN",
         "isometry STUDY RUN",
-        "monitor STUDY target RUN --timeout 1",
+        "monitor STUDY target RUN --timeout 1 --tolerance 0.1",
         "describe STUDY RUN",
         "reconstruct STUDY RUN -o OUT",
         "add STUDY RUN",

@@ -14,6 +14,7 @@
 //! | eigenbasis | [`basis`] | the reference | [`basis::Basis`] |
 //! | how each place has turned | [`rotation`] | a shape | sin θ × axis |
 //! | other quantities on it: plastic strain | [`field`] | a run, a state | a function on the surface |
+//! | how far edges and triangles stretch | [`strain`] | a shape | strains |
 //! | coefficients of every state | [`project`] | a run | [`project::Projected`] |
 //! | what is kept on disk | [`study`] | all of it | [`study::Study`] |
 //! | eigenpairs of a surface, alone | [`eigen`] | a surface | [`eigen::Solved`], a file |
@@ -66,6 +67,7 @@ pub mod rotation;
 pub mod run;
 pub mod select;
 pub mod similarity;
+pub mod strain;
 pub mod study;
 pub mod surface;
 pub mod target;

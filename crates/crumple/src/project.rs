@@ -12,10 +12,10 @@ use std::time::{Duration, Instant};
 use crate::Error;
 use crate::basis::{Basis, coefficients_of};
 use crate::field::Field;
-use crate::isometry::{Sizes, quantile};
 use crate::reference::{Placement, Reference};
 use crate::rotation::{self, Rest};
 use crate::run::Run;
+use crate::strain::{Sizes, quantile};
 use crate::vector::{Vector, square, subtract};
 
 /// A run, projected.

@@ -33,7 +33,6 @@ impl Isometry {
         let loaded = Loaded::open(&self.study)?;
         let named = Named::in_study(&loaded.study, &self.run);
         let last = resolve(&loaded, &named)?;
-        output.notes_on(&last.run, &last.warnings);
         let all = if named.state.is_some() { last.state..last.state + 1 } else { 0..states(&loaded.study, &named)? };
         let of = |state| {
             let named = Named { run: named.run.clone(), state: Some(state) };
@@ -44,6 +43,7 @@ impl Isometry {
             Some(count) => Some(shift(&loaded, &named, &last, count, watch)?),
             None => None,
         };
+        output.notes_on(&last.run, &last.warnings);
         let most = found.iter().map(|state| state.edges.p95).fold(0.0, f64::max);
         let answer = json!({
             "run": last.run, "states": found, "thin": most > isometry::STRAIN_THIN,
