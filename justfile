@@ -75,6 +75,21 @@ bench-read repeats="3":
     cargo build --release -p d3plot --example read_speed
     python3 benches/read_peers.py target/release/examples/read_speed --scratch target/bench-read --repeats {{ repeats }}
 
+# projecting a bundle beside reading its files alone, and beside lasso-python + NumPy doing the same: the example, whose
+# files hold little beside positions, and runs with all that a solver writes
+bench-projection repeats="3":
+    cargo build --release
+    cargo build --release -p d3plot --example read_speed
+    target/release/examples/read_speed bundle target/bench-projection
+    python3 benches/projection.py examples/hat-section/runs --repeats {{ repeats }}
+    python3 benches/projection.py target/bench-projection --repeats {{ repeats }} --join ""
+
+# a search of a million descriptors of 51 numbers beside plain reading from memory; 4 GB below target/
+bench-search folder="target/bench-search":
+    cargo build --release -p crumple --example search_speed
+    test -d {{ folder }}/study || target/release/examples/search_speed make {{ folder }}
+    target/release/examples/search_speed time {{ folder }}
+
 # the table of docs/reading.md: every test family read by us, lasso-python, VTK and dynars (the last: pip install dynars)
 read-table:
     cargo build --release

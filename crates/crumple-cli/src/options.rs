@@ -133,7 +133,8 @@ pub(crate) struct ModesArgs {
     seed: Option<u64>,
     /// What makes runs alike: `rotation`, the kind and direction of the deformation wherever it happens, `displacement`,
     /// where every place ends up, as in the paper (also: `paper`), `coordinates`, which have the distances of the
-    /// displacement, or a field that the study keeps [default: rotation]
+    /// displacement, a field that the study keeps, or a shape and a field together, each by its spread in the study, as
+    /// displacement,plastic_strain [default: rotation]
     #[arg(long, value_name = "WHAT")]
     by: Option<String>,
     /// How to group: kmeans, ward, average, mixture (of Gaussians), or hdbscan, which leaves runs in no dense group without a

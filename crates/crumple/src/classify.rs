@@ -55,7 +55,7 @@ pub struct Verdict {
     pub score: f64,
     /// How much more it is like that mode than like the next one; null with one mode.
     pub margin: Option<f64>,
-    /// The smallest score that the nearest mode takes.
+    /// The smallest score that the nearest mode takes; −∞ (null in JSON) for a mode of one run, which takes any.
     pub accepted: f64,
     /// Score for every mode, best first.
     pub scores: Vec<(String, f64)>,

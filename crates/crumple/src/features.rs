@@ -155,6 +155,15 @@ impl Features {
         self.blocks.iter().zip(&self.needs).flat_map(of).collect::<Vec<String>>()
     }
 
+    /// For each need the numbers as (stored + offset) · factor; `None` where they are made from stored ones in another way.
+    pub(crate) fn affine(&self) -> Option<Vec<(f64, &[f64])>> {
+        let of = |block| match block {
+            &Block::Values { ref offset, scale, .. } => Some((scale, &offset[..])),
+            Block::Spectrum(_) | Block::Kind(_) => None,
+        };
+        self.blocks.iter().map(of).collect()
+    }
+
     /// √λ of each number's eigenvector; `None` where numbers are not of one eigenvector.
     pub(crate) fn frequencies(&self) -> Option<Vec<f64>> {
         let of = |block: &Block| match block {
@@ -213,6 +222,11 @@ impl Samples {
     /// What [`Features::vector`] takes.
     pub fn stored(&self, row: usize) -> Vec<Stored<'_>> {
         self.blocks.iter().map(|block| block.stored(row)).collect()
+    }
+
+    /// The coefficients of each need.
+    pub fn blocks(&self) -> &[Coefficients] {
+        &self.blocks
     }
 
     /// The coefficients of the first need.

@@ -14,6 +14,7 @@
 //! | eigenbasis | [`basis`] | the reference | [`basis::Basis`] |
 //! | how each place has turned | [`rotation`] | a shape | sin θ × axis |
 //! | other quantities on it: plastic strain | [`field`] | a run, a state | a function on the surface |
+//! | how far edges and triangles stretch | [`strain`] | a shape | strains |
 //! | coefficients of every state | [`project`] | a run | [`project::Projected`] |
 //! | what is kept on disk | [`study`] | all of it | [`study::Study`] |
 //! | eigenpairs of a surface, alone | [`eigen`] | a surface | [`eigen::Solved`], a file |
@@ -29,6 +30,7 @@
 //! | how alike | [`similarity`] | a descriptor, coefficients | a ranking |
 //! | from which similarity on | [`calibrate`] | a descriptor, known runs | a threshold, its error rates |
 //! | which mode, or none | [`classify`] | modes, a state | [`classify::Verdict`] |
+//! | does the surface stretch | [`isometry`] | a state | strains, shift of the eigenvalues |
 //! | why they are alike | [`explain`] | two states | terms, regions, words |
 //! | a run that is being computed | [`monitor`] | states as they come | on the target's path or not |
 //! | judged against labels | [`compare`] | labels | precision, average precision |
@@ -52,6 +54,7 @@ pub mod feature_table;
 pub mod features;
 pub mod field;
 pub mod inputs;
+pub mod isometry;
 pub mod joints;
 pub mod modes;
 pub mod monitor;
@@ -64,6 +67,7 @@ pub mod rotation;
 pub mod run;
 pub mod select;
 pub mod similarity;
+pub mod strain;
 pub mod study;
 pub mod surface;
 pub mod target;

@@ -15,7 +15,8 @@ use crate::field::Field;
 use crate::reference::{Placement, Reference};
 use crate::rotation::{self, Rest};
 use crate::run::Run;
-use crate::vector::{Vector, area, distance, square, subtract};
+use crate::strain::{Sizes, quantile};
+use crate::vector::{Vector, square, subtract};
 
 /// A run, projected.
 #[derive(Debug, Clone)]
@@ -173,7 +174,7 @@ impl<'a> Projector<'a> {
             return Err(Error::NoStates { run: run.id().to_owned(), reason });
         }
         let placement = self.place(run)?;
-        if placement.offset_max > 1e-3 * self.geometry.edge_mean {
+        if placement.offset_max > 1e-3 * self.geometry.sizes.edge_mean() {
             warnings.push(format!("undeformed positions differ from the reference run's by up to {:.2e}; displacements count from the reference", placement.offset_max));
         }
         let functions = 3 + self.fields.len();
@@ -375,9 +376,7 @@ impl Measures {
 /// Undeformed positions and edges, once for all runs.
 struct Geometry<'a> {
     undeformed: &'a [Vector],
-    triangles: &'a [[u32; 3]],
-    /// Areas of the triangles, T.
-    areas: Vec<f64>,
+    sizes: Sizes<'a>,
     /// For M-products.
     basis: &'a Basis,
     /// Area of each vertex, N.
@@ -385,29 +384,14 @@ struct Geometry<'a> {
     area: f64,
     /// Σ a |p⁰ − centre|²: the size of the part.
     spread: f64,
-    edges: Vec<(u32, u32, f64)>,
-    edge_mean: f64,
 }
 
 impl<'a> Geometry<'a> {
     fn of(reference: &'a Reference, basis: &'a Basis) -> Self {
         let undeformed = reference.mesh.vertices();
-        let mut ends: Vec<(u32, u32)> = reference
-            .mesh
-            .triangles()
-            .iter()
-            .flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)])
-            .map(|(a, b)| (a.min(b), a.max(b)))
-            .collect();
-        ends.sort_unstable();
-        ends.dedup();
-        let length = |a: u32, b: u32| distance(undeformed[a as usize], undeformed[b as usize]);
-        let edges: Vec<_> = ends.into_iter().map(|(a, b)| (a, b, length(a, b))).filter(|edge| edge.2 > 0.0).collect();
-        let edge_mean = edges.iter().map(|edge| edge.2).sum::<f64>() / edges.len().max(1) as f64;
-        let triangles = reference.mesh.triangles();
-        let areas = triangles.iter().map(|corners| area(corners.map(|vertex| undeformed[vertex as usize]))).collect();
+        let sizes = Sizes::of(&reference.mesh);
         let (shares, area) = (&basis.area[..], basis.area.iter().sum());
-        let mut geometry = Self { undeformed, triangles, areas, basis, shares, area, spread: 0.0, edges, edge_mean };
+        let mut geometry = Self { undeformed, sizes, basis, shares, area, spread: 0.0 };
         let centre = geometry.centre(undeformed);
         geometry.spread = undeformed.iter().zip(shares).map(|(p, share)| share * square(subtract(*p, centre))).sum();
         geometry
@@ -432,14 +416,7 @@ impl<'a> Geometry<'a> {
         let energy = self.basis.square_norm(displacement);
         let max = displacement.iter().map(|d| square(*d)).fold(0.0, f64::max).sqrt();
         let caught: f64 = delta.iter().map(|d| square(*d)).sum();
-        let strain =
-            |&(a, b, length): &(u32, u32, f64)| (distance(shape[a as usize], shape[b as usize]) / length - 1.0).abs();
-        let mut strains: Vec<f64> = self.edges.iter().map(strain).collect();
-        let stretch = |(corners, from): (&[u32; 3], &f64)| {
-            (area(corners.map(|vertex| shape[vertex as usize])) / from - 1.0).abs()
-        };
-        let with_area = self.triangles.iter().zip(&self.areas).filter(|(_, area)| **area > 0.0);
-        let mut stretches: Vec<f64> = with_area.map(stretch).collect();
+        let [mut strains, mut stretches] = self.sizes.strains(shape);
         Measures {
             rms: (norm2 / self.area).sqrt(),
             max,
@@ -481,10 +458,4 @@ impl<'a> Geometry<'a> {
             .unwrap_or(0.0);
         (spread - 2.0 * largest).max(0.0)
     }
-}
-
-/// The value below which this share of the values lies; 0 of none.
-fn quantile(values: &mut [f64], share: f64) -> f64 {
-    let at = ((values.len() as f64 - 1.0) * share).round() as usize;
-    if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(at, f64::total_cmp).1 }
 }

@@ -4,10 +4,13 @@
 //! what is compared (centred by the study's mean; weighted) or how (Euclidean, Mahalanobis). Ties are broken by run
 //! id and state, so a ranking is reproducible.
 
+mod scan;
+
 use std::str::FromStr;
 
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
+use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::Error;
@@ -16,6 +19,14 @@ use crate::features::{Features, Samples};
 use crate::select::Kind;
 use crate::study::{Loaded, Rows, Stored};
 use crate::target::Target;
+use scan::{Slice, Smallest, Sums};
+
+/// Rows that are compared at a time: what is known of them stays in the first-level cache.
+const ROWS: usize = 512;
+/// Rows that one thread takes at a time.
+const SHARE: usize = 32 * ROWS;
+/// Relative rounding of a handful of operations, generously.
+const SLACK: f64 = 1e-12;
 
 /// What is compared, and how.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -103,6 +114,17 @@ pub struct Comparer {
     to_length: f64,
     /// Inverse of the shrunk covariance.
     precision: Option<Mat<f64>>,
+    /// The same comparison as one pass over stored coefficients, where the numbers are stored ones but for scale and offset.
+    scan: Option<Scan>,
+}
+
+/// A comparison that goes over stored coefficients.
+#[derive(Debug, Clone)]
+struct Scan {
+    /// One for each of [`Features::needs`].
+    slices: Vec<Slice>,
+    /// Σ t².
+    square: f64,
 }
 
 impl Comparer {
@@ -150,8 +172,10 @@ impl Comparer {
             Kind::Rotation => 1.0,
             Kind::Paper => 1.0 / basis.total_mass().sqrt(),
         };
-        let mut comparer = Self { features, centre, weights, target: Vec::new(), metric, to_length, precision: None };
+        let mut comparer =
+            Self { features, centre, weights, target: Vec::new(), metric, to_length, precision: None, scan: None };
         comparer.target = comparer.transform(target);
+        comparer.scan = comparer.as_scan();
         if metric == Metric::Mahalanobis {
             let values = values.into_iter().map(|row| comparer.transform(row)).collect::<Vec<_>>();
             comparer.precision = Some(shrunk_precision(&values));
@@ -174,18 +198,15 @@ impl Comparer {
 
     /// Compares one state. `stored`: one entry for each of [`Features::needs`].
     pub fn score(&self, stored: &[Stored<'_>]) -> Score {
+        if let Some(scan) = &self.scan {
+            let mut sums = [[0.0; 2]];
+            scan.slices.iter().zip(stored).for_each(|(slice, stored)| self.add(slice, stored.values, &mut sums));
+            return self.of_sums(scan, sums[0]);
+        }
         let value = self.transform(self.features.vector(stored));
         match self.metric {
-            Metric::Cosine => {
-                let similarity = cosine(&self.target, &value);
-                Score { similarity, distance: 1.0 - similarity }
-            }
-            Metric::Euclidean => {
-                let distance = self.to_length * norm(&difference(&self.target, &value));
-                let own = self.to_length * norm(&self.target);
-                let similarity = if distance == 0.0 { 1.0 } else { own / (own + distance) };
-                Score { similarity, distance }
-            }
+            Metric::Cosine => of_cosine(cosine(&self.target, &value)),
+            Metric::Euclidean => self.of_distance(norm(&difference(&self.target, &value)), norm(&self.target)),
             Metric::Mahalanobis => {
                 let d = difference(&self.target, &value);
                 let quadratic: f64 = self.precision.as_ref().map_or(0.0, |precision| {
@@ -197,6 +218,51 @@ impl Comparer {
         }
     }
 
+    fn of_distance(&self, distance: f64, own: f64) -> Score {
+        let (distance, own) = (self.to_length * distance, self.to_length * own);
+        Score { similarity: if distance == 0.0 { 1.0 } else { own / (own + distance) }, distance }
+    }
+
+    /// The comparison as one pass: (stored · factor + offset − centre) · weight against the target.
+    fn as_scan(&self) -> Option<Scan> {
+        if self.metric == Metric::Mahalanobis {
+            return None;
+        }
+        let mut first = 0;
+        let mut slices = Vec::new();
+        for (factor, offset) in self.features.affine()? {
+            let of = first..first + offset.len();
+            let (centre, weights) = (&self.centre[of.clone()], &self.weights[of.clone()]);
+            let factors: Vec<f64> = weights.iter().map(|weight| factor * weight).collect();
+            let shifted = offset.iter().zip(centre).zip(weights);
+            let offsets: Vec<f64> =
+                shifted.map(|((offset, centre), weight)| (offset * factor - centre) * weight).collect();
+            slices.push(Slice::new(&factors, &offsets, &self.target[of.clone()]));
+            first = of.end;
+        }
+        let square = slices.iter().map(Slice::target_square).sum();
+        Some(Scan { slices, square })
+    }
+
+    fn add(&self, slice: &Slice, values: &[f32], sums: &mut [Sums]) {
+        match self.metric {
+            Metric::Cosine => slice.add::<true>(values, sums),
+            Metric::Euclidean | Metric::Mahalanobis => slice.add::<false>(values, sums),
+        }
+    }
+
+    fn of_sums(&self, scan: &Scan, [first, second]: Sums) -> Score {
+        match self.metric {
+            Metric::Cosine => of_cosine(match (scan.square == 0.0, second == 0.0) {
+                (true, true) => 1.0,
+                (true, false) | (false, true) => 0.0,
+                // One root, so that equal vectors give exactly 1.
+                (false, false) => (first / (scan.square * second).sqrt()).clamp(-1.0, 1.0),
+            }),
+            Metric::Euclidean | Metric::Mahalanobis => self.of_distance(first.sqrt(), scan.square.sqrt()),
+        }
+    }
+
     fn transform(&self, mut values: Vec<f64>) -> Vec<f64> {
         for ((x, centre), weight) in values.iter_mut().zip(&self.centre).zip(&self.weights) {
             *x = (*x - centre) * weight;
@@ -204,17 +270,60 @@ impl Comparer {
         values
     }
 
-    /// Every state of these rows, read as [`Comparer::features`] say, against the target, best first.
-    pub(crate) fn rank(&self, samples: &Samples) -> Vec<Hit> {
+    /// The rows most like the target, `count` of them or all there are, best first; ties by run and state. The rows are
+    /// read as [`Comparer::features`] say.
+    pub fn best(&self, samples: &Samples, count: usize) -> Vec<Hit> {
+        let rows = samples.rows();
+        let share = |first: usize| {
+            let (mut smallest, end) = (Smallest::new(count), (first + SHARE).min(rows));
+            for first in (first..end).step_by(ROWS) {
+                self.offer(samples, first..(first + ROWS).min(end), &mut smallest);
+            }
+            smallest
+        };
+        let shares: Vec<usize> = (0..rows).step_by(SHARE).collect();
+        let best = shares.into_par_iter().map(share).reduce(|| Smallest::new(count), Smallest::with);
         let hit = |row: usize| Hit {
             run: samples.run(row).to_owned(),
             state: samples.state(row),
             time: samples.time(row),
             score: self.score(&samples.stored(row)),
         };
-        let mut hits: Vec<Hit> = (0..samples.rows()).map(hit).collect();
-        rank(&mut hits, self.metric);
-        hits
+        best.rows().into_iter().map(hit).collect()
+    }
+
+    /// Compares some rows and offers those that may be among the best.
+    fn offer(&self, samples: &Samples, rows: std::ops::Range<usize>, smallest: &mut Smallest) {
+        let Some(scan) = &self.scan else {
+            return rows.for_each(|row| smallest.offer(self.key(&self.score(&samples.stored(row))), row));
+        };
+        let mut sums = [[0.0; 2]; ROWS];
+        let sums = &mut sums[..rows.len()];
+        for (slice, block) in scan.slices.iter().zip(samples.blocks()) {
+            self.add(slice, &block.values[rows.start * slice.width..rows.end * slice.width], sums);
+        }
+        // Most rows are passed over without a root and a division. What rounding makes of the bound is less than SLACK.
+        let bound = smallest.bound();
+        let (square, least) = (bound * bound, -bound);
+        let floor = square * scan.square * (1.0 - SLACK);
+        let ceiling = square / (self.to_length * self.to_length) * (1.0 + SLACK);
+        let worth = |&[first, second]: &Sums| match self.metric {
+            Metric::Cosine => least <= 0.0 || (first > 0.0 && first * first >= floor * second),
+            Metric::Euclidean | Metric::Mahalanobis => first <= ceiling,
+        };
+        for (row, sums) in rows.zip(&*sums).filter(|(_, sums)| worth(sums)) {
+            smallest.offer(self.key(&self.of_sums(scan, *sums)), row);
+        }
+    }
+
+    /// What is smaller the more alike a state is.
+    fn key(&self, score: &Score) -> f64 {
+        if self.metric == Metric::Euclidean { score.distance } else { -score.similarity }
+    }
+
+    /// Every state of these rows against the target, best first.
+    pub(crate) fn rank(&self, samples: &Samples) -> Vec<Hit> {
+        self.best(samples, samples.rows())
     }
 }
 
@@ -228,14 +337,36 @@ pub fn search(
     options: SimilarityOptions,
     rows: Rows<'_>,
 ) -> Result<Vec<Hit>, Error> {
-    let comparer = Comparer::new(loaded, descriptor, options)?;
-    Ok(comparer.rank(&comparer.features.read(&loaded.study, rows)?))
+    Ok(search_best(loaded, descriptor, options, rows, usize::MAX)?.hits)
 }
 
-/// Best first; ties by run and state.
-fn rank(hits: &mut [Hit], metric: Metric) {
-    let key = |hit: &Hit| if metric == Metric::Euclidean { hit.score.distance } else { -hit.score.similarity };
-    hits.sort_by(|a, b| key(a).total_cmp(&key(b)).then_with(|| (&a.run, a.state).cmp(&(&b.run, b.state))));
+/// What a search found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Found {
+    /// The states most like the descriptor, best first.
+    pub hits: Vec<Hit>,
+    /// How many states were compared.
+    pub searched: usize,
+}
+
+/// The `count` states most like a descriptor: what [`search`] gives first, without sorting the others.
+///
+/// # Errors
+/// As [`search`].
+pub fn search_best(
+    loaded: &Loaded,
+    descriptor: &Descriptor,
+    options: SimilarityOptions,
+    rows: Rows<'_>,
+    count: usize,
+) -> Result<Found, Error> {
+    let comparer = Comparer::new(loaded, descriptor, options)?;
+    let samples = comparer.features.read(&loaded.study, rows)?;
+    Ok(Found { hits: comparer.best(&samples, count), searched: samples.rows() })
+}
+
+fn of_cosine(similarity: f64) -> Score {
+    Score { similarity, distance: 1.0 - similarity }
 }
 
 /// Cosine of the angle between two vectors; 0 where one of them is zero (it has no direction), 1 where both are.
@@ -346,20 +477,6 @@ mod tests {
         assert_eq!(cosine(&[0.0, 0.0], &[0.0, 0.0]), 1.0);
         // The squares of these do not fit into f64.
         assert_eq!(cosine(&[1e200, 0.0], &[1e-200, 0.0]), 1.0);
-    }
-
-    #[test]
-    fn ties_are_broken_by_run_and_state() {
-        let hit = |run: &str, state, similarity| Hit {
-            run: run.into(),
-            state,
-            time: 0.0,
-            score: Score { similarity, distance: 1.0 - similarity },
-        };
-        let mut hits = vec![hit("b", 0, 0.5), hit("a", 1, 0.5), hit("a", 0, 0.5), hit("c", 0, 0.9)];
-        rank(&mut hits, Metric::Cosine);
-        let order: Vec<_> = hits.iter().map(|hit| (hit.run.as_str(), hit.state)).collect();
-        assert_eq!(order, [("c", 0), ("a", 0), ("a", 1), ("b", 0)]);
     }
 
     #[test]

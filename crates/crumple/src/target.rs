@@ -182,6 +182,17 @@ pub fn resolve(loaded: &Loaded, named: &Named) -> Result<Target, Error> {
     Ok(Target::of_state(projected.run, state, found, projected.warnings))
 }
 
+/// How many states a run has, of the study or at that path.
+///
+/// # Errors
+/// [`Error::UnknownRun`] and reading errors.
+pub fn states(study: &Study, named: &Named) -> Result<usize, Error> {
+    match study.manifest().runs.get(&named.run) {
+        Some(record) => Ok(record.times.len()),
+        None => Ok(open_outside(study, &named.run)?.times().len()),
+    }
+}
+
 /// Positions of a target on the mesh, N × 3, read from its result file.
 ///
 /// # Errors

@@ -5,7 +5,11 @@
 
 mod world;
 
-use crumple::study::{AddOptions, Rows};
+use crumple::descriptor::{DescribeOptions, Threshold, describe};
+use crumple::select::Kind;
+use crumple::similarity::{SimilarityOptions, search, search_best};
+use crumple::study::{AddOptions, Loaded, Rows};
+use crumple::target::Named;
 use world::{Model, World, bend};
 
 /// Bytes that this process has read.
@@ -48,4 +52,21 @@ fn ten_of_five_hundred_eigenvectors_cost_little_more_than_their_share() {
     let allowed = (10 * 3 * 720 * 4) + 2 * (3_100 * 150 + 33 * 8192);
     assert!(ten <= allowed, "ten eigenvectors cost {ten} bytes, all cost {all}, the study has {part}");
     assert!(ten * 5 < all, "ten eigenvectors cost {ten} bytes, all 500 cost {all}");
+
+    // The same of a search, from opening the study on: beside its own ten eigenvectors it reads manifest, mesh and basis.
+    let options = DescribeOptions { kind: Kind::Paper, threshold: Threshold::Top(10), ..DescribeOptions::default() };
+    let loaded = Loaded::of(study).unwrap();
+    let descriptor = describe(&loaded, &Named::parse("run_03"), None, Some("d"), &options).unwrap().descriptor;
+    let before = bytes_read().unwrap();
+    let opened = Loaded::open(&world.path("study")).unwrap();
+    let found = search_best(&opened, &descriptor, SimilarityOptions::default(), Rows::All, 5).unwrap();
+    let searched = bytes_read().unwrap() - before;
+    let size = |name: &str| world.path("study").join(name).metadata().unwrap().len();
+    let study_itself = size("manifest.json") + size("mesh.vtu") + size("basis.safetensors") + 4096;
+    assert!(searched <= allowed + study_itself, "{searched} bytes for a search, {ten} for its coefficients alone");
+    // The best five are the first of all.
+    assert_eq!((found.searched, found.hits.len()), (720, 5));
+    let every = search(&opened, &descriptor, SimilarityOptions::default(), Rows::All).unwrap();
+    assert_eq!(found.hits, every[..5]);
+    assert_eq!((every.len(), every[0].score.similarity), (720, 1.0));
 }

@@ -6,7 +6,7 @@ use crumple::basis::{BasisOptions, coefficients};
 use crumple::bundle::find;
 use crumple::descriptor::{DescribeOptions, Threshold, describe};
 use crumple::field::Field;
-use crumple::modes::{By, ModesOptions, modes};
+use crumple::modes::{Along, By, ModesOptions, States, modes};
 use crumple::run::{FieldValues, Run};
 use crumple::select::Kind;
 use crumple::similarity::{SimilarityOptions, search};
@@ -81,6 +81,31 @@ fn descriptors_search_and_modes_take_a_field_alone_and_beside_the_shape() {
     }
     let by_strain = ModesOptions { by: By::Field(strain()), count: Some(2), ..Default::default() };
     assert_eq!(modes(&loaded.study, &by_strain, &()).unwrap().modes.len(), 2);
+}
+
+#[test]
+fn modes_by_shape_and_field_weigh_both_alike_whatever_the_unit() {
+    let folder = tempfile::tempdir().unwrap();
+    let loaded = study(folder.path(), &[strain()]);
+    let of = |by: &str, states| {
+        let options = ModesOptions { by: by.parse().unwrap(), count: Some(3), states, ..Default::default() };
+        modes(&loaded.study, &options, &()).unwrap()
+    };
+    for by in ["displacement,plastic_strain", "rotation,plastic_strain"] {
+        let both = of(by, States::Last);
+        assert_eq!(both.modes.len(), 3, "{by}");
+        assert_eq!(both.unit("mm"), "");
+        // Both kinds have a mean square of 1 about their mean, so all runs together have 2.
+        let one = ModesOptions { by: by.parse().unwrap(), count: Some(1), ..Default::default() };
+        let one = modes(&loaded.study, &one, &()).unwrap();
+        assert!((one.modes[0].spread - 2_f64.sqrt()).abs() < 1e-6, "{by}: {}", one.modes[0].spread);
+        assert!(both.modes.iter().all(|mode| mode.spread < one.modes[0].spread));
+        of(by, States::Series { along: Along::Intrusion });
+    }
+    assert_eq!("shape,plastic_strain".parse::<By>().unwrap(), By::DisplacementAnd(strain()));
+    for wrong in ["displacement,", "plastic_strain,displacement", "shape,colour", ","] {
+        assert!(wrong.parse::<By>().is_err(), "{wrong}");
+    }
 }
 
 #[test]

@@ -3,6 +3,7 @@
 //! ```text
 //! cargo run --release -p d3plot --example read_speed -- make FOLDER     200k shells, 12 states, 400 MB
 //! cargo run --release -p d3plot --example read_speed -- many FOLDER     a family of 1,000 files
+//! cargo run --release -p d3plot --example read_speed -- bundle FOLDER   20 runs of 9,025 shells, 20 states each, 600 MB
 //! cargo run --release -p d3plot --example read_speed -- read FOLDER     coordinates of all states against plain reading
 //! cargo run --release -p d3plot --example read_speed -- once FOLDER     opens and reads the coordinates once: for its memory
 //! cargo run --release -p d3plot --example read_speed -- open FOLDER     opening against `stat` on every file
@@ -26,10 +27,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     match what.as_str() {
         "make" => make(folder, 500, 400, 12, None),
         "many" => make(folder, 10, 10, 999, Some(1)),
+        "bundle" => (1..=20).try_for_each(|run| make(&folder.join(format!("run_{run:02}")), 95, 95, 20, None)),
         "read" => read(folder),
         "once" => once(folder),
         "open" => open(folder),
-        _ => Err("make, many, read, once or open".into()),
+        _ => Err("make, many, bundle, read, once or open".into()),
     }
 }
 

@@ -53,7 +53,8 @@ impl Classify {
                     time(judged.time),
                     verdict.mode.clone().unwrap_or_else(|| "none".into()),
                     format!("{:.3}", verdict.score),
-                    format!("{:.3}", verdict.accepted),
+                    // A mode of one run says nothing of how far its members lie apart.
+                    if verdict.accepted.is_finite() { format!("{:.3}", verdict.accepted) } else { "any".into() },
                     verdict.margin.map_or_else(|| "–".into(), |margin| format!("{margin:.3}")),
                     match &verdict.mode {
                         Some(_) => format!("most like {} ({:.3})", verdict.like.0, verdict.like.1),

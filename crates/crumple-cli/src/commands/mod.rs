@@ -15,6 +15,7 @@ mod features;
 mod info;
 mod init;
 mod interactive;
+mod isometry;
 mod modes;
 mod monitor;
 mod reconstruct;
@@ -62,6 +63,8 @@ pub(crate) enum Command {
     Classify(classify::Classify),
     /// Why two runs are alike or different: at which wavelengths, which way, and where on the part
     Explain(explain::Explain),
+    /// Does the surface stretch, which the method assumes it hardly does? Strains of every state of a run
+    Isometry(isometry::Isometry),
     /// One number for an optimiser: how far a run is from a descriptor
     Distance(distance::Distance),
     /// The numbers that are compared, one row a run, for optimisers and meta-models
@@ -96,6 +99,7 @@ impl Command {
             Self::Verify(command) => command.run(output),
             Self::Classify(command) => command.run(output),
             Self::Explain(command) => command.run(output),
+            Self::Isometry(command) => command.run(output, watch),
             Self::Distance(command) => command.run(output),
             Self::Features(command) => command.run(output),
             Self::Monitor(command) => command.run(output, watch),

@@ -6,7 +6,7 @@ use clap::Args;
 use crumple::Error;
 use crumple::descriptor::Descriptor;
 use crumple::explain::explain;
-use crumple::similarity::{self, Hit};
+use crumple::similarity::{self, Found, Hit};
 use crumple::study::{Loaded, Rows};
 use crumple::target::{Named, resolve};
 use crumple::transfer::transfer;
@@ -47,9 +47,7 @@ impl Search {
         let (options, rows) = (self.similarity.options()?, rows(self.states.as_deref())?);
         let loaded = Loaded::open(&self.study)?;
         let descriptor = self.wanted(&loaded, output)?;
-        let mut hits = similarity::search(&loaded, &descriptor, options, rows)?;
-        let searched = hits.len();
-        hits.truncate(self.top);
+        let Found { hits, searched } = similarity::search_best(&loaded, &descriptor, options, rows, self.top)?;
         let why = self.reasons(&loaded, &descriptor, &hits)?;
         output.print(&json!({ "descriptor": descriptor.name, "kind": options.kind_for(&descriptor), "searched": searched, "results": hits, "why": why }), || {
             let cells = hits.iter().zip(1..).map(|(hit, rank)| {

@@ -68,7 +68,7 @@ impl Threshold {
     /// it is asked only by [`Threshold::Error`].
     ///
     /// # Errors
-    /// [`Error::Threshold`] if the rule makes no sense, if nothing passes, or the wanted error cannot be reached with K eigenvectors.
+    /// [`Error::Threshold`] if the rule makes no sense, if nothing passes or everything does, or the wanted error cannot be reached with K eigenvectors.
     pub fn select(
         &self,
         values: &[[f64; 3]],
@@ -93,6 +93,15 @@ impl Threshold {
                 Err(fail("all coefficients are zero: the state is the undeformed one".into()))
             } else if eigenvectors.is_empty() {
                 Err(fail(format!("no coefficient is larger than t = {t:.6}; the largest is {most:.6}")))
+            } else if eigenvectors.len() == values.len()
+                && values.len() > 1
+                && !matches!(self, Self::Std(c) if *c >= 0.0)
+            {
+                let least = largest.iter().copied().fold(f64::INFINITY, f64::min);
+                Err(fail(format!(
+                    "all {} eigenvectors have a coefficient larger than t = {t:.6}, so it chooses nothing; t of {least:.6} and more leaves some out",
+                    values.len()
+                )))
             } else {
                 Ok(Selection { eigenvectors, threshold: t })
             }

@@ -175,19 +175,26 @@ pub(crate) fn groups(study: &Study, basis: &Basis, options: &ModesOptions, watch
         let have = study.manifest().runs.len();
         return Err(Error::TooFewRuns { what: "grouping into modes", needed: RUNS_MIN, have });
     }
-    if let By::Field(field) = options.by
+    if let Some(field) = options.by.field()
         && !study.settings().fields.contains(&field)
     {
         return Err(crate::target::unknown_field(field, study.settings().fields.iter().copied()));
     }
     let sampled = states::sample(study, options.by, &options.states, basis.total_mass())?;
+    // A field beside a shape: the same states of the same runs.
+    let beside = options.by.each().into_iter().skip(1);
+    let beside = beside.map(|by| Ok((by, states::sample(study, by, &options.states, basis.total_mass())?)));
+    let beside: Vec<(By, states::Sampled)> = beside.collect::<Result<_, Error>>()?;
     let runs = sampled.runs.len();
     if runs < RUNS_MIN {
         let what = "grouping into modes by states that all runs reach";
         return Err(Error::TooFewRuns { what, needed: RUNS_MIN, have: runs });
     }
     check(options, runs)?;
-    let points = Points::of(options.by, &sampled.rows, sampled.per_run, basis);
+    let each = options.by.each().into_iter().take(1).map(|by| (by, &sampled));
+    let each = each.chain(beside.iter().map(|(by, sampled)| (*by, sampled)));
+    let points =
+        Points::together(each.map(|(by, sampled)| Points::of(by, &sampled.rows, sampled.per_run, basis)).collect());
     let distances = points.distances();
     let smallest = options.smallest.unwrap_or((runs / 4).clamp(2, 5));
     let grouper = Grouper::new(&points, &distances, options.method, options.seed, smallest);
@@ -294,7 +301,7 @@ impl Modes {
     /// Unit of distances and spreads; empty where they have none.
     pub fn unit<'a>(&self, length_unit: &'a str) -> &'a str {
         match self.by {
-            By::Rotation | By::Field(_) => "",
+            By::Rotation | By::Field(_) | By::RotationAnd(_) | By::DisplacementAnd(_) => "",
             By::Displacement | By::Coordinates => length_unit,
         }
     }

@@ -58,14 +58,37 @@ pub enum By {
     Coordinates,
     /// A field that the study keeps: all its K coefficients, in its own unit.
     Field(Field),
+    /// The rotation spectrum and a field together, each over its spread among the runs; distances have no unit.
+    #[serde(rename = "rotation_and")]
+    RotationAnd(Field),
+    /// The displacement and a field together, likewise.
+    #[serde(rename = "displacement_and")]
+    DisplacementAnd(Field),
 }
 
 impl By {
-    /// The stored function that is looked at.
-    pub(crate) fn function(self) -> Function {
+    /// What is looked at together: one, or a shape and a field.
+    pub(crate) fn each(self) -> Vec<Self> {
         match self {
-            Self::Rotation => Function::Rotation,
-            Self::Displacement | Self::Coordinates => Function::Displacement,
+            Self::RotationAnd(field) => vec![Self::Rotation, Self::Field(field)],
+            Self::DisplacementAnd(field) => vec![Self::Displacement, Self::Field(field)],
+            one => vec![one],
+        }
+    }
+
+    /// The field in it.
+    pub(crate) fn field(self) -> Option<Field> {
+        match self {
+            Self::Field(field) | Self::RotationAnd(field) | Self::DisplacementAnd(field) => Some(field),
+            Self::Rotation | Self::Displacement | Self::Coordinates => None,
+        }
+    }
+
+    /// The stored function that is looked at, of one of [`By::each`].
+    pub(super) fn function(self) -> Function {
+        match self {
+            Self::Rotation | Self::RotationAnd(_) => Function::Rotation,
+            Self::Displacement | Self::Coordinates | Self::DisplacementAnd(_) => Function::Displacement,
             Self::Field(field) => Function::Field(field),
         }
     }
@@ -163,14 +186,27 @@ impl FromStr for By {
     fn from_str(text: &str) -> Result<Self, Error> {
         let words =
             [("rotation", Self::Rotation), ("displacement", Self::Displacement), ("coordinates", Self::Coordinates)];
-        match words.iter().find(|(word, _)| *word == text) {
-            Some((_, by)) => Ok(*by),
+        let wrong = || {
+            Error::Value {
+            name: "--by",
+            value: text.to_owned(),
+            expected: "rotation, displacement (or paper), coordinates, a field such as plastic_strain, or shape and field as displacement,plastic_strain".into(),
+        }
+        };
+        if let Some((_, by)) = words.iter().find(|(word, _)| *word == text) {
+            return Ok(*by);
+        }
+        match text.split_once(',') {
             None if text == "paper" => Ok(Self::Displacement),
-            None => text.parse().map(Self::Field).map_err(|_| Error::Value {
-                name: "--by",
-                value: text.to_owned(),
-                expected: "rotation, displacement (or paper), coordinates, or a field such as plastic_strain".into(),
-            }),
+            None => text.parse().map(Self::Field).map_err(|_| wrong()),
+            Some((shape, field)) => {
+                let field = field.trim().parse().map_err(|_| wrong())?;
+                match shape.trim() {
+                    "rotation" => Ok(Self::RotationAnd(field)),
+                    "displacement" | "paper" | "coordinates" | "shape" => Ok(Self::DisplacementAnd(field)),
+                    _ => Err(wrong()),
+                }
+            }
         }
     }
 }

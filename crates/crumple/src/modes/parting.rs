@@ -66,7 +66,9 @@ pub(super) fn partings(
     if states.saturating_mul(3 * study.manifest().eigenpairs) > VALUES_MAX {
         return Ok(Err(format!("{states} states are too many to look for the state at which modes part")));
     }
-    let histories = Histories::read(study, by, Along::Time, basis.total_mass())?;
+    let read = |by: By| Ok((by, Histories::read(study, by, Along::Time, basis.total_mass())?));
+    let each: Vec<(By, Histories)> = by.each().into_iter().map(read).collect::<Result<_, Error>>()?;
+    let histories = &each[0].1;
     let of_run =
         |id: &String| histories.runs.binary_search_by(|run| run.run.cmp(id)).ok().map(|at| &histories.runs[at]);
     let mut runs: Vec<&History> = Vec::new();
@@ -84,7 +86,9 @@ pub(super) fn partings(
     let pairs: Vec<(usize, usize)> = (0..modes.len()).flat_map(|a| (a + 1..modes.len()).map(move |b| (a, b))).collect();
     let mut evidence: Vec<Vec<Apart>> = vec![Vec::new(); pairs.len()];
     for &time in &stations {
-        let distances = Points::of(by, &histories.at(&runs, &[time]), 1, basis).distances();
+        // Every function has the same states of the same runs.
+        let points = each.iter().map(|(by, histories)| Points::of(*by, &histories.at(&runs, &[time]), 1, basis));
+        let distances = Points::together(points.collect()).distances();
         for (&(a, b), evidence) in pairs.iter().zip(&mut evidence) {
             let (a, b) = (&members[a], &members[b]);
             if a.len() >= RUNS_MIN && b.len() >= RUNS_MIN {

@@ -4,6 +4,7 @@ use std::cmp::Ordering;
 
 use super::shapes::z_displacement;
 use crate::basis::BasisFacts;
+use crate::isometry;
 use crate::modes::Modes;
 use crate::study::{Loaded, RunRecord, Study};
 
@@ -26,11 +27,7 @@ pub(super) fn isometry_words(records: &[&RunRecord]) -> Option<String> {
     let mut strains: Vec<f64> = records.iter().map(|run| run.last.strain_p95).collect();
     strains.sort_by(f64::total_cmp);
     let median = *strains.get(strains.len() / 2)?;
-    let caveat = if median > 0.1 {
-        "; the method assumes that the surface hardly stretches, and here it does in places, so compare shapes, not small differences"
-    } else {
-        ""
-    };
+    let caveat = isometry::caveat(median).map(|caveat| format!("; {caveat}")).unwrap_or_default();
     Some(format!(
         "in the last state of a typical run, 95 % of the edges change their length by less than {:.1} %{caveat}",
         100.0 * median

@@ -151,12 +151,18 @@ impl Coefficients {
     pub(crate) fn sorted(self) -> Self {
         let mut order: Vec<usize> = (0..self.rows()).collect();
         order.sort_by(|&a, &b| (&self.runs[a], self.states[a]).cmp(&(&self.runs[b], self.states[b])));
+        if order.is_sorted() {
+            return self;
+        }
+        let mut values = Vec::with_capacity(self.values.len());
+        order.iter().for_each(|&row| values.extend_from_slice(self.row(row)));
+        let mut runs = self.runs;
         Self {
-            runs: order.iter().map(|&row| self.runs[row].clone()).collect(),
             states: order.iter().map(|&row| self.states[row]).collect(),
             times: order.iter().map(|&row| self.times[row]).collect(),
             rms: order.iter().filter_map(|&row| self.rms.get(row).copied()).collect(),
-            values: order.iter().flat_map(|&row| self.row(row).iter().copied()).collect(),
+            runs: order.iter().map(|&row| std::mem::take(&mut runs[row])).collect(),
+            values,
             function: self.function,
             eigenvectors: self.eigenvectors,
         }
