@@ -205,6 +205,10 @@ impl Gram {
         progress: &Progress,
     ) -> Result<(), EigenError> {
         let count = self.blocks;
+        if 2 * changed.len() > count {
+            *self = Gram::of(blocks, kind, progress)?;
+            return Ok(());
+        }
         for (&i, out) in changed.iter().zip(products(blocks, changed, |i| (i..i + 1, count), kind, progress)?) {
             for (k, out) in out.iter().enumerate() {
                 let (low, high) = (k.min(i), k.max(i));
@@ -247,14 +251,12 @@ impl Gram {
         // V ← V + V C. Columns that belong to no pair are left alone.
         let count = self.blocks;
         let mut c = vec![SMALL_ZERO; count * count];
+        let mut coupled = vec![false; count * count];
         let scales: Vec<f64> = places.iter().map(|&place| 1.0 / self.entry(place, place).sqrt()).collect();
-        let mut partners: Vec<Vec<usize>> = vec![Vec::new(); count];
         let mut set = |from: usize, to: usize, value: f64| {
-            let (k, i) = (from / WIDTH, to / WIDTH);
-            c[i * count + k][from % WIDTH][to % WIDTH] = value;
-            if !partners[i].contains(&k) {
-                partners[i].push(k);
-            }
+            let at = to / WIDTH * count + from / WIDTH;
+            c[at][from % WIDTH][to % WIDTH] = value;
+            coupled[at] = true;
         };
         for (i, &b) in places.iter().enumerate() {
             for (k, &a) in places[..i].iter().enumerate() {
@@ -269,6 +271,19 @@ impl Gram {
                 }
             }
         }
+        // Two blocks at a time, from the blocks that either is coupled to.
+        let jobs: Vec<(Vec<usize>, Vec<Small>)> = coupled
+            .chunks(2 * count)
+            .zip(c.chunks(2 * count))
+            .map(|(coupled, c)| {
+                let from: Vec<usize> = (0..count).filter(|k| coupled[*k..].iter().step_by(count).any(|x| *x)).collect();
+                let c = c.chunks(count).flat_map(|c| from.iter().map(|&k| c[k])).collect();
+                (from, c)
+            })
+            .collect();
+        drop(c);
+        let mut needed = vec![false; count];
+        jobs.iter().flat_map(|(from, _)| from).for_each(|&k| needed[k] = true);
         let n = blocks[0].len();
         let mut panels: Vec<Vec<&mut [Row]>> = (0..n.div_ceil(PANEL / 4)).map(|_| Vec::new()).collect();
         for block in blocks {
@@ -276,17 +291,17 @@ impl Gram {
         }
         panels.par_iter_mut().try_for_each(|panel| {
             progress.go_on()?;
-            let before: Vec<Vec<Row>> = panel.iter().map(|rows| rows.to_vec()).collect();
-            for (i, rows) in panel.iter_mut().enumerate() {
-                if partners[i].is_empty() {
-                    continue;
-                }
-                let from: Vec<&[Row]> = partners[i].iter().map(|&k| &before[k][..]).collect();
-                let c: Vec<Small> = partners[i].iter().map(|&k| c[i * count + k]).collect();
-                kernel::update(kind, &from, &c, &mut [rows], true);
+            let before: Vec<Vec<Row>> = panel
+                .iter()
+                .zip(&needed)
+                .map(|(rows, needed)| if *needed { rows.to_vec() } else { Vec::new() })
+                .collect();
+            for (own, (from, c)) in panel.chunks_mut(2).zip(&jobs).filter(|(_, (from, _))| !from.is_empty()) {
+                let from: Vec<&[Row]> = from.iter().map(|&k| &before[k][..]).collect();
+                kernel::update(kind, &from, c, own, true);
             }
             Ok(())
         })?;
-        Ok((0..count).filter(|&i| !partners[i].is_empty()).collect())
+        Ok((0..count).filter(|&i| !jobs[i / 2].0.is_empty()).collect())
     }
 }
