@@ -514,7 +514,10 @@ fn rules_and_numbers_that_make_no_sense() {
             (&["modes", "STUDY", "--method", "guess"], "kmeans"),
             (&["modes", "STUDY", "--seed", "x"], "--seed"),
             (&["modes", "STUDY", "--choose", "taste"], "silhouette or stability"),
-            (&["modes", "STUDY", "--by", "colour"], "rotation, displacement (or paper), coordinates, a field such as plastic_strain"),
+            (
+                &["modes", "STUDY", "--by", "colour"],
+                "rotation, displacement (or paper), coordinates, a field such as plastic_strain",
+            ),
             (&["modes", "STUDY", "--method", "hdbscan", "--count", "3"], "--smallest"),
             (&["modes", "STUDY", "--method", "hdbscan", "--smallest", "1"], "2 to the number of runs"),
             (&["modes", "STUDY", "--smallest", "3"], "--method hdbscan"),

@@ -15,7 +15,7 @@
 //!
 //! Orthogonality is lost along the eigenvectors next to the shift: there a solve loses most digits, and there Op
 //! multiplies most what has been lost. So every block is made orthogonal to the few Ritz vectors nearest to the shift,
-//! which are read anyway or cost little, and the whole basis is gone through only every third or fourth block.
+//! which are read anyway or cost little, and the whole basis is gone through only every second to fourth block.
 
 use std::ops::Range;
 

@@ -40,8 +40,8 @@ pub(crate) struct Loss {
     deflated: Vec<Vec<f64>>,
     /// The share of the noise that is not along them, by what repairs have measured.
     share: Option<f64>,
-    /// The estimates of the last two steps, the last one first; none right after a repair.
-    estimates: [Option<f64>; 2],
+    /// The estimate of the last step; none right after a repair.
+    estimate: Option<f64>,
     /// For each column that the space started with, the error of what is known of its product with Op.
     inherited: Vec<f64>,
     scale: f64,
@@ -67,12 +67,12 @@ impl Loss {
             omega.extend((0..columns).map(|_| noise(roundings * ROUNDING, random)));
             omega.extend(identity());
         }
-        self.estimates = [None; 2];
+        self.estimate = None;
     }
 
     /// Learns from what a repair has measured how much of the noise counts.
     pub(crate) fn compare(&mut self, measured: f64) {
-        if let [Some(estimate), _] = self.estimates {
+        if let Some(estimate) = self.estimate {
             let share = self.share.unwrap_or(SHARE[0]) * IN_HAND * measured / estimate;
             self.share = Some(share.clamp(SHARE[1], SHARE[2]));
         }
@@ -138,9 +138,7 @@ impl Loss {
         next.extend((0..WIDTH).map(|_| noise(ROUNDING, random))); // neighbours are orthogonalised explicitly
         next.extend(identity());
         self.before = std::mem::replace(&mut self.now, next);
-        let [before, _] = self.estimates;
-        self.estimates = [Some(most), before];
-        most * before.map_or(GROWTH, |before| (most / before).max(1.0))
+        most * self.estimate.replace(most).map_or(GROWTH, |before| (most / before).max(1.0))
     }
 }
 

@@ -181,8 +181,10 @@ pub(crate) const ROUNDING: f64 = 8.0 * 4e-16;
 /// How often vectors are polished, at most: each time takes a digit of the noise away.
 const POLISH_MAX: usize = 3;
 
-/// Degree of the polishing polynomial; 3 to 5 serve.
-const POLISH_DEGREE: usize = 4;
+/// The part of the spectrum below ‖A‖ that polishing damps from, as a share of ‖A‖, and the largest degree of its
+/// polynomial.
+const POLISH_FROM: f64 = 0.25;
+const POLISH_DEGREE_MAX: usize = 10;
 
 /// Polishes a block of vectors if their residuals ask for it; returns these.
 fn settle(tools: &Tools, block: &mut [Row], eigenvalues: &[f64], scratch: &mut [Row]) -> Result<Vec<f64>, Trouble> {
@@ -203,19 +205,22 @@ fn settle(tools: &Tools, block: &mut [Row], eigenvalues: &[f64], scratch: &mut [
         if polished == POLISH_MAX || squares.iter().any(|square| square.is_nan()) {
             return Err(Trouble::Again(format!("residual {most:e}, {allowed:e} allowed")));
         }
-        polish(tools, block, eigenvalues, scratch);
+        // |T_d| outside [−1, 1] is the hyperbolic cosine of d times that of T_1's inverse.
+        let outside = ((1.0 + POLISH_FROM) / (1.0 - POLISH_FROM)).acosh();
+        let degree = ((most / (0.3 * allowed)).acosh() / outside).ceil() as usize;
+        polish(tools, block, eigenvalues, degree.clamp(2, POLISH_DEGREE_MAX), scratch);
         polished += 1;
     }
 }
 
-/// x ← T_d(t(A)) x / T_d(t(λ)) with the Chebyshev polynomial T_d, t mapping [‖A‖/8, ‖A‖] to [−1, 1]: damps the rounding
+/// x ← T_d(t(A)) x / T_d(t(λ)) with the Chebyshev polynomial T_d, t mapping [‖A‖/4, ‖A‖] to [−1, 1]: damps the rounding
 /// noise at the upper end of the spectrum, which the residual multiplies by ‖A‖/λ_K, and leaves the pair alone.
-fn polish(tools: &Tools, block: &mut [Row], eigenvalues: &[f64], scratch: &mut [Row]) {
+fn polish(tools: &Tools, block: &mut [Row], eigenvalues: &[f64], degree: usize, scratch: &mut [Row]) {
     let Tools { matrix, kind, norm, .. } = *tools;
-    let (centre, half) = (norm * (1.0 + 0.125) / 2.0, norm * (1.0 - 0.125) / 2.0);
+    let (centre, half) = (norm * (1.0 + POLISH_FROM) / 2.0, norm * (1.0 - POLISH_FROM) / 2.0);
     let [mut before, mut now]: [&mut [Row]; 2] = [block, &mut scratch[..matrix.rows()]];
     kernel::sparse(kind, matrix, before, now, [1.0 / half, -centre / half, 0.0]);
-    for _ in 1..POLISH_DEGREE {
+    for _ in 1..degree {
         // T_{d+1} = 2 t T_d − T_{d−1}, in place of T_{d−1}.
         kernel::sparse(kind, matrix, now, before, [2.0 / half, -2.0 * centre / half, -1.0]);
         [before, now] = [now, before];
@@ -224,7 +229,7 @@ fn polish(tools: &Tools, block: &mut [Row], eigenvalues: &[f64], scratch: &mut [
     for (k, eigenvalue) in eigenvalues.iter().enumerate() {
         let t = (eigenvalue - centre) / half;
         let (mut before, mut value) = (1.0, t);
-        for _ in 1..POLISH_DEGREE {
+        for _ in 1..degree {
             (before, value) = (value, 2.0 * t * value - before);
         }
         scale[k] = 1.0 / value;
