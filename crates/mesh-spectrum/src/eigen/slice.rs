@@ -181,10 +181,10 @@ pub(crate) const ROUNDING: f64 = 8.0 * 4e-16;
 /// How often vectors are polished, at most: each time takes a digit of the noise away.
 const POLISH_MAX: usize = 3;
 
-/// The part of the spectrum below ‖A‖ that polishing damps from, as a share of ‖A‖, and the largest degree of its
-/// polynomial.
-const POLISH_FROM: f64 = 0.25;
-const POLISH_DEGREE_MAX: usize = 10;
+/// Where the part of the spectrum begins that polishing damps, as a share of ‖A‖; the least and the largest degree of
+/// its polynomial.
+const POLISH_FROM: f64 = 0.125;
+const POLISH_DEGREE: [usize; 2] = [4, 12];
 
 /// Polishes a block of vectors if their residuals ask for it; returns these.
 fn settle(tools: &Tools, block: &mut [Row], eigenvalues: &[f64], scratch: &mut [Row]) -> Result<Vec<f64>, Trouble> {
@@ -208,12 +208,12 @@ fn settle(tools: &Tools, block: &mut [Row], eigenvalues: &[f64], scratch: &mut [
         // |T_d| outside [−1, 1] is the hyperbolic cosine of d times that of T_1's inverse.
         let outside = ((1.0 + POLISH_FROM) / (1.0 - POLISH_FROM)).acosh();
         let degree = ((most / (0.3 * allowed)).acosh() / outside).ceil() as usize;
-        polish(tools, block, eigenvalues, degree.clamp(2, POLISH_DEGREE_MAX), scratch);
+        polish(tools, block, eigenvalues, degree.clamp(POLISH_DEGREE[0], POLISH_DEGREE[1]), scratch);
         polished += 1;
     }
 }
 
-/// x ← T_d(t(A)) x / T_d(t(λ)) with the Chebyshev polynomial T_d, t mapping [‖A‖/4, ‖A‖] to [−1, 1]: damps the rounding
+/// x ← T_d(t(A)) x / T_d(t(λ)) with the Chebyshev polynomial T_d, t mapping [‖A‖/8, ‖A‖] to [−1, 1]: damps the rounding
 /// noise at the upper end of the spectrum, which the residual multiplies by ‖A‖/λ_K, and leaves the pair alone.
 fn polish(tools: &Tools, block: &mut [Row], eigenvalues: &[f64], degree: usize, scratch: &mut [Row]) {
     let Tools { matrix, kind, norm, .. } = *tools;
