@@ -85,7 +85,23 @@ pub(crate) fn two(value: Option<f64>) -> String {
     value.map_or_else(|| "–".into(), |value| format!("{value:.2}"))
 }
 
-/// A time as a person reads it: with the digits that a single-precision file has.
+/// A time as a person reads it: with the digits that its file has, single precision or double.
 pub(crate) fn time(time: f64) -> String {
-    (time as f32).to_string()
+    let single = time as f32;
+    if f64::from(single) == time { single.to_string() } else { time.to_string() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_have_the_digits_of_their_precision() {
+        assert_eq!(time(f64::from(0.1_f32)), "0.1");
+        let (one, next) = (1e-3_f32, f32::from_bits(1e-3_f32.to_bits() + 1));
+        assert_ne!(time(f64::from(one)), time(f64::from(next)));
+        // Two states of a double-precision file, a tenth of a microsecond apart after a second.
+        assert_eq!([1.0000001, 1.00000015].map(time), ["1.0000001", "1.00000015"]);
+        assert_eq!(time(0.0), "0");
+    }
 }

@@ -633,7 +633,7 @@ fn too_few_runs_for_what_is_asked() {
             let mut command = world::program();
             command.arg("search").arg(&study).arg("run_001").args(option);
             let needed = if option.contains(&"mahalanobis") { "at least 3 runs" } else { "at least 2 runs" };
-            world::finish(command).refused(&[needed, "the study has 1"]).hints("add more runs");
+            world::finish(command).refused(&[needed, "there are 1"]).hints("add more runs");
         }
     });
     crumple!["search", &study, "run_001"].done();

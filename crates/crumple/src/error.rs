@@ -264,7 +264,7 @@ pub enum Error {
         run: String,
     },
     /// A study too small for what was asked.
-    #[error("{what} needs at least {needed} runs; the study has {have}")]
+    #[error("{what} needs at least {needed} runs; there are {have}")]
     TooFewRuns {
         /// What was asked for.
         what: &'static str,
