@@ -4,11 +4,10 @@
 //! Eigenvalues say what that does to the operator, for they depend on lengths on the surface alone: λ of the deformed mesh,
 //! with the same ties, against those of the study's basis. On an isometric deformation they are the same.
 
-use mesh_spectrum::{EigenOptions, OperatorOptions, Watch, ties_of};
+use mesh_spectrum::{EigenOptions, OperatorOptions, Watch};
 use serde::Serialize;
 
 use crate::Error;
-use crate::joints::Join;
 use crate::strain::{Quantiles, Sizes, quantile};
 use crate::study::Loaded;
 use crate::target::{Named, Target, shape};
@@ -74,14 +73,10 @@ pub fn shift(loaded: &Loaded, named: &Named, target: &Target, count: usize, watc
         mass.map_err(|_| unreadable("unknown mass".into()))?,
     );
     // Sheets stay joined where they were joined undeformed.
-    let ties = match (study.settings().join.and_then(Join::distance), study.joints()?) {
-        (Some(distance), _) => ties_of(&reference.mesh, distance).map_err(Error::Join)?,
-        (None, Some(joints)) => crate::study::ties(&joints, reference, &study.settings().reference)?,
-        (None, None) => Vec::new(),
-    };
+    let ties = crate::study::ties_of(loaded)?;
     let deformed = reference
         .mesh
-        .with_vertices(shape(loaded, named, target)?)
+        .moved(shape(loaded, named, target)?)
         .map_err(|source| Error::Mesh { run: target.run.clone(), source })?;
     let operator = mesh_spectrum::operator(&deformed, &OperatorOptions { join: None, ties, kind, mass })?;
     let options = EigenOptions { count: null_space + count, ..Default::default() };

@@ -161,15 +161,6 @@ impl Mesh {
         Ok(Mesh { vertices, triangles, face_of_triangle, faces_left_out, rings })
     }
 
-    /// The same faces, split as they are here, over vertices that have moved.
-    ///
-    /// # Errors
-    /// Coordinates that are not finite, or another number of them.
-    pub fn with_vertices(&self, vertices: Vec<[f64; 3]>) -> Result<Mesh, MeshError> {
-        check(&vertices, self.triangles.iter().map(|triangle| &triangle[..]))?;
-        Ok(Mesh { vertices, ..self.clone() })
-    }
-
     /// N vertices, in the model's length unit.
     pub fn vertices(&self) -> &[[f64; 3]] {
         &self.vertices

@@ -186,12 +186,12 @@ impl FromStr for By {
     fn from_str(text: &str) -> Result<Self, Error> {
         let words =
             [("rotation", Self::Rotation), ("displacement", Self::Displacement), ("coordinates", Self::Coordinates)];
-        let wrong = || {
-            Error::Value {
+        let wrong = || Error::Value {
             name: "--by",
             value: text.to_owned(),
-            expected: "rotation, displacement (or paper), coordinates, a field such as plastic_strain, or shape and field as displacement,plastic_strain".into(),
-        }
+            expected: "rotation, displacement (or paper), coordinates, a field such as plastic_strain, \
+                       or shape and field as displacement,plastic_strain"
+                .into(),
         };
         if let Some((_, by)) = words.iter().find(|(word, _)| *word == text) {
             return Ok(*by);

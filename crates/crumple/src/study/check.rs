@@ -4,7 +4,6 @@ use std::path::Path;
 
 use super::store::Lock;
 use super::{Error, FileRecord, LOCK, Loaded, Manifest, Rows, Study, coefficients, joints_file, tables};
-use crate::joints::Join;
 
 /// What a check found.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
@@ -98,18 +97,14 @@ fn contradictions(folder: &Path, manifest: &Manifest) -> Vec<String> {
 /// Whether the basis is that of the surface joined as the settings say: every vertex that follows others has the mean of
 /// their values in every eigenvector.
 fn join_not_held(loaded: &Loaded) -> Result<Option<String>, Error> {
-    let Loaded { study, reference, basis, .. } = loaded;
+    let Loaded { study, basis, .. } = loaded;
     if study.settings().join != basis.facts.join {
         return Ok(Some("study.toml and the basis say different things about the join".into()));
     }
-    let ties = match study.settings().join {
-        None => return Ok(None),
-        Some(Join::Distance(distance)) => mesh_spectrum::ties_of(&reference.mesh, distance)?,
-        Some(Join::Deck(_)) => match study.joints()? {
-            Some(joints) => joints_file::ties(&joints, reference, &study.settings().reference)?,
-            None => Vec::new(),
-        },
-    };
+    if study.settings().join.is_none() {
+        return Ok(None);
+    }
+    let ties = joints_file::ties_of(loaded)?;
     if ties.len() != basis.facts.joined_pairs {
         return Ok(Some(format!(
             "{} vertices are joined, the basis was made with {}",

@@ -4,10 +4,10 @@ use std::path::Path;
 
 use mesh_spectrum::Tie;
 
-use super::store;
+use super::{Loaded, store};
 use crate::Error;
 use crate::error::io;
-use crate::joints::Joints;
+use crate::joints::{Join, Joints};
 use crate::reference::Reference;
 
 /// Its name in a study's folder.
@@ -21,6 +21,18 @@ pub(crate) fn write(joints: &Joints, path: &Path) -> Result<(), Error> {
 pub(crate) fn read(path: &Path) -> Result<Joints, Error> {
     let text = std::fs::read(path).map_err(io("read", path))?;
     serde_json::from_slice(&text).map_err(|error| Error::Damaged { path: path.to_owned(), what: error.to_string() })
+}
+
+/// The ties by vertices that a study's surface was joined by, as its settings say; none if it was not joined.
+pub(crate) fn ties_of(loaded: &Loaded) -> Result<Vec<Tie>, Error> {
+    let Loaded { study, reference, .. } = loaded;
+    match study.settings().join {
+        None => Ok(Vec::new()),
+        Some(Join::Distance(distance)) => Ok(mesh_spectrum::ties_of(&reference.mesh, distance)?),
+        Some(Join::Deck(_)) => {
+            study.joints()?.map_or(Ok(Vec::new()), |joints| ties(&joints, reference, &study.settings().reference))
+        }
+    }
 }
 
 /// The ties by vertices of the mesh.

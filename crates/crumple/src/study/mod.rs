@@ -40,7 +40,7 @@ pub use add::{AddOptions, Added};
 pub use check::{Checkup, check};
 pub(crate) use coefficients::triples;
 pub use coefficients::{Coefficients, Function, Need, Stored, column_name};
-pub(crate) use joints_file::ties;
+pub(crate) use joints_file::ties_of;
 pub use loaded::Loaded;
 pub use manifest::{FileRecord, LAYOUT, Manifest, RunRecord};
 pub use mesh_file::write_shape;

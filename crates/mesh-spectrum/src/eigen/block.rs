@@ -99,6 +99,16 @@ pub(crate) fn negative(a: &Small) -> Small {
     a.map(|row| row.map(|x| -x))
 }
 
+/// A += B.
+#[inline(always)]
+pub(crate) fn add(a: &mut Small, b: &Small) {
+    for i in 0..WIDTH {
+        for j in 0..WIDTH {
+            a[i][j] += b[i][j];
+        }
+    }
+}
+
 /// A B.
 pub(crate) fn product(a: &Small, b: &Small) -> Small {
     std::array::from_fn(|i| std::array::from_fn(|j| (0..WIDTH).map(|k| a[i][k] * b[k][j]).sum()))

@@ -26,8 +26,8 @@ const HAND_OVER: usize = 4;
 
 /// The largest |L| and the smallest |D| (in mean spacings of eigenvalues) a shift is used with: above and below, the
 /// solve loses digits (measured: 10 % of the shifts are moved).
-const GROWTH_MAX: f64 = 1e4;
-const PIVOT_MIN: f64 = 5e-3;
+pub(crate) const GROWTH_MAX: f64 = 1e4;
+pub(crate) const PIVOT_MIN: f64 = 5e-3;
 
 /// What a chain has to find.
 #[derive(Debug, Clone, Copy)]

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::eigen::block::{Row, SMALL_ZERO, Small, WIDTH, ZERO, transpose};
+use crate::eigen::block::{Row, SMALL_ZERO, Small, WIDTH, ZERO, add, transpose};
 use crate::eigen::component::{Component, Pairs};
 use crate::eigen::kernel::{self, Kind};
 use crate::eigen::{EigenError, Orthogonality, Progress};
@@ -157,21 +157,19 @@ fn products(
                 let (own, end) = of(i);
                 out.resize(sum.len(), SMALL_ZERO);
                 kernel::gram(kind, &panel[..end], &panel[own], &mut out);
-                add(sum, &out);
+                add_all(sum, &out);
             }
         }
         Ok(sums)
     };
     let parts = (0..n).into_par_iter().step_by(part).map(one).collect::<Result<Vec<_>, EigenError>>()?;
     let mut sums = zero();
-    parts.iter().for_each(|part| sums.iter_mut().zip(part).for_each(|(sum, part)| add(sum, part)));
+    parts.iter().for_each(|part| sums.iter_mut().zip(part).for_each(|(sum, part)| add_all(sum, part)));
     Ok(sums)
 }
 
-fn add(sums: &mut [Small], parts: &[Small]) {
-    for (sum, part) in sums.as_flattened_mut().iter_mut().zip(parts.as_flattened()) {
-        (0..WIDTH).for_each(|k| sum[k] += part[k]);
-    }
+fn add_all(sums: &mut [Small], parts: &[Small]) {
+    sums.iter_mut().zip(parts).for_each(|(sum, part)| add(sum, part));
 }
 
 /// Vᵀ V, the blocks (k, i) with k ≤ i, one i after another.

@@ -6,7 +6,7 @@
 //! Tall blocks do not fit in any cache, so every product reads each of them once, panel by panel, for as many columns
 //! as the registers hold; the lines that come next are asked for ahead of time.
 
-use crate::eigen::block::{Row, SMALL_ZERO, Small, WIDTH, ZERO, transpose};
+use crate::eigen::block::{Row, SMALL_ZERO, Small, WIDTH, ZERO, add, transpose};
 use crate::eigen::factor::Pivots;
 use crate::eigen::front::{Tree, Workspace, factor_with};
 use crate::eigen::solve::{Packed, solve_with};
@@ -129,15 +129,6 @@ pub(crate) fn outer<A: Arithmetic, const HIGH: usize, const P: usize>(q: &[Row],
         }
     }
     out
-}
-
-#[inline(always)]
-fn add(sum: &mut Small, part: &Small) {
-    for a in 0..WIDTH {
-        for k in 0..WIDTH {
-            sum[a][k] += part[a][k];
-        }
-    }
 }
 
 /// out[i·blocks + k] = Q_kᵀ W_i; the first block decides how many rows there are.

@@ -23,7 +23,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use crate::eigen::EigenError;
-use crate::eigen::block::{Block, Row, SMALL_ZERO, Small, WIDTH, ZERO, cholesky, negative, product, transpose};
+use crate::eigen::block::{Block, Row, SMALL_ZERO, Small, WIDTH, ZERO, add, cholesky, negative, product, transpose};
 use crate::eigen::factor::Factor;
 use crate::eigen::kernel::{self, gram_of};
 use crate::eigen::loss::{Loss, uniform};
@@ -456,14 +456,6 @@ impl<'a> Krylov<'a> {
 impl Drop for Krylov<'_> {
     fn drop(&mut self) {
         self.tools.pool.give(self.basis.drain(..).chain(self.nearest.drain(..)));
-    }
-}
-
-fn add(sum: &mut Small, part: &Small) {
-    for a in 0..WIDTH {
-        for c in 0..WIDTH {
-            sum[a][c] += part[a][c];
-        }
     }
 }
 

@@ -13,13 +13,10 @@ use faer::{Conj, Mat, MatMut, Par, Side};
 
 use super::Pairs;
 use crate::eigen::EigenError;
+use crate::eigen::chain::{GROWTH_MAX, PIVOT_MIN};
 use crate::eigen::seconds::{Clock, Step};
 use crate::eigen::weyl::Weyl;
 use crate::operator::{Csr, Operator};
-
-/// Growth and pivots (in mean spacings) a shift is used with, as for the diagonal mass.
-const GROWTH_MAX: f64 = 1e4;
-const PIVOT_MIN: f64 = 5e-3;
 
 /// A connected component.
 pub(super) struct Pencil {
