@@ -1,6 +1,20 @@
 """Markdown tables, and pages whose tables and pictures are made anew between marks that carry their names."""
 
+import argparse
 import re
+
+
+def arguments(doc, scratch, made):
+    """The words of a bench that writes a page; `made`: what `--only` chooses from."""
+    parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--program", default="target/release/crumple")
+    parser.add_argument("--structures", default="target/release/structures")
+    parser.add_argument("--scratch", default=scratch)
+    parser.add_argument("--example", default="examples/hat-section")
+    parser.add_argument("--fine", default="../shared/data/hat-section-fine")
+    parser.add_argument("--only", nargs="*", help=f"{made} to make, by name")
+    parser.add_argument("--write", help="page whose tables are replaced")
+    return parser.parse_args()
 
 
 def table(head, rows, text=1):

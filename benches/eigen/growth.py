@@ -23,7 +23,7 @@ from matplotlib import pyplot
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 sys.path[:0] = [str(HERE), str(ROOT / "benches")]
-from pages import write  # noqa: E402
+import pages  # noqa: E402
 from run import once  # noqa: E402
 
 BY_N = [(n, 500) for n in (3_000, 10_000, 30_000, 100_000, 300_000, 1_000_000)]
@@ -44,13 +44,11 @@ def measured(options: argparse.Namespace) -> dict[tuple[int, int], dict]:
     return {case: run for case, run in found.items() if "failed" not in run}
 
 
-def table(found: dict[tuple[int, int], dict]) -> list[str]:
-    lines = ["| vertices | K | seconds | peak memory | of it the result | residual | orthogonality | solves a pair |",
-             "| ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"]
-    for (_, k), run in sorted(found.items()):
-        n = run["vertices"]
-        lines.append(f"| {n:,} | {k} | {run['wall']:.2f} | {run['peak_mb']:.0f} MB | {8e-6 * n * k:.0f} MB | {run['residual']:.0e} "
-                     f"| {run['orthogonality']:.0e} | {run['solves'] / k:.1f} |")
+def table(found: dict[tuple[int, int], dict]) -> str:
+    head = ["vertices", "K", "seconds", "peak memory", "of it the result", "residual", "orthogonality", "solves a pair"]
+    rows = [[f"{run['vertices']:,}", k, f"{run['wall']:.2f}", f"{run['peak_mb']:.0f} MB", f"{8e-6 * run['vertices'] * k:.0f} MB", f"{run['residual']:.0e}",
+             f"{run['orthogonality']:.0e}", f"{run['solves'] / k:.1f}"] for (_, k), run in sorted(found.items())]
+    lines = [pages.table(head, rows, text=0)]
     for by, cases in (("N", BY_N[2:]), ("K", BY_K[1:])):
         low, high = found.get(cases[0]), found.get(cases[-1])
         if low and high:
@@ -58,7 +56,7 @@ def table(found: dict[tuple[int, int], dict]) -> list[str]:
             power = [math.log(high[what] / low[what]) / math.log(size(high) / size(low)) for what in ("wall", "peak_mb")]
             lines += ["", f"From {size(low):,} to {size(high):,} {'vertices' if by == 'N' else 'pairs'} time grows as {by}^{power[0]:.2f}, "
                           f"memory as {by}^{power[1]:.2f}."]
-    return lines
+    return "\n".join(lines)
 
 
 def picture(found: dict[tuple[int, int], dict], file: Path) -> None:
@@ -84,7 +82,7 @@ def main() -> None:
     options = parser.parse_args()
     found = measured(options)
     picture(found, options.page.parent / "images/eigen-growth.png")
-    write(options.page, {"growth": "\n".join(table(found))})
+    pages.write(options.page, {"growth": table(found)})
 
 
 if __name__ == "__main__":

@@ -24,7 +24,7 @@ from statistics import median
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 sys.path.insert(0, str(ROOT / "benches"))
-from pages import write  # noqa: E402
+import pages  # noqa: E402
 
 MESHES = {"9k": "hat:9000", "100k": "hat:100000", "1M": "hat:1000000", "9k-apart": "hat-apart:9000", "100k-apart": "hat-apart:100000",
           "1M-apart": "hat-apart:1000000", "9k-closed": "closed:9000", "100k-closed": "closed:100000"}
@@ -85,12 +85,12 @@ def main() -> None:
                     file.write_text(json.dumps(found))
                     print(file.stem, found.get("failed") or f"{found['wall']:.2f} s", flush=True)
     lines = table(options.scratch)
-    print("\n".join(lines))
+    print(lines)
     if options.page:
-        write(options.page, {"peers": "\n".join(lines)})
+        pages.write(options.page, {"peers": lines})
 
 
-def table(scratch: Path) -> list[str]:
+def table(scratch: Path) -> str:
     """Medians of what has been run."""
     cases: dict[tuple, dict[str, list]] = {}
     for file in sorted((scratch / "runs").glob("*.json")):
@@ -115,14 +115,13 @@ def table(scratch: Path) -> list[str]:
                 row["over_limit"] = middle["wall"] * threads / row["limit"]
             rows.append(row)
     (scratch / "table.json").write_text(json.dumps(rows, indent=1))
-    lines = ["| mesh | K | threads | who | runs | wall s | CPU s | peak MB | residual | orthogonality | missing | wall ÷ ours | CPU ÷ ours | over the limit |",
-             "| --- | ---: | ---: | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"]
-    for r in rows:
-        ratio = f"{r['ratio']:.1f} | {r['ratio_cpu']:.1f}" if "ratio" in r else "- | -"
-        limit = f"{r['over_limit']:.1f}" if "over_limit" in r else ""
-        lines.append(f"| {r['mesh']} | {r['pairs']} | {r['threads']} | {r['who']} | {r['runs']} | {r['wall']:.2f} | {r['process_cpu']:.2f} | {r['peak_mb']:.0f} "
-                     f"| {r['residual']:.1e} | {r['orthogonality']:.1e} | {r['missing']:.0f} | {ratio} | {limit} |")
-    (scratch / "table.md").write_text("\n".join(lines) + "\n")
+    head = ["mesh", "who", "K", "threads", "runs", "wall s", "CPU s", "peak MB", "residual", "orthogonality", "missing", "wall ÷ ours", "CPU ÷ ours",
+            "over the limit"]
+    number = lambda row, key: f"{row[key]:.1f}" if key in row else ""
+    lines = pages.table(head, [
+        [r["mesh"], r["who"], r["pairs"], r["threads"], r["runs"], f"{r['wall']:.2f}", f"{r['process_cpu']:.2f}", f"{r['peak_mb']:.0f}", f"{r['residual']:.1e}",
+         f"{r['orthogonality']:.1e}", f"{r['missing']:.0f}", *(number(r, key) for key in ("ratio", "ratio_cpu", "over_limit"))] for r in rows], text=2)
+    (scratch / "table.md").write_text(lines + "\n")
     return lines
 
 

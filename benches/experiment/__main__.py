@@ -6,7 +6,6 @@ Needs NumPy, SciPy, pandas, pyarrow, scikit-learn, matplotlib, vtk, lasso-python
 the marks that carry its name, and the pictures into `images` beside the page.
 """
 
-import argparse
 import os
 import subprocess
 import sys
@@ -35,18 +34,6 @@ import uses
 from cases import Case
 
 SECTIONS = [ranking, claims, independent, unseen, curves, robustness, isometry, decks, uses, pictures, summary]
-
-
-def arguments():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--program", default="target/release/crumple")
-    parser.add_argument("--structures", default="target/release/structures")
-    parser.add_argument("--scratch", default="target/experiment")
-    parser.add_argument("--example", default="examples/hat-section")
-    parser.add_argument("--fine", default="../shared/data/hat-section-fine")
-    parser.add_argument("--only", nargs="*", help="tables and pictures to make, by name")
-    parser.add_argument("--write", help="page whose tables are replaced")
-    return parser.parse_args()
 
 
 class Bench:
@@ -87,7 +74,7 @@ class Bench:
 
 
 def main():
-    options = arguments()
+    options = pages.arguments(__doc__, "target/experiment", "tables and pictures")
     bench, made = Bench(options), {}
     images = os.path.join(os.path.dirname(options.write), "images") if options.write else options.scratch
     wanted = lambda name: not options.only or name in options.only

@@ -6,7 +6,6 @@ Needs NumPy, SciPy, pandas, pyarrow, scikit-learn, lasso-python. `--write docs/r
 the marks that carry its name.
 """
 
-import argparse
 import os
 import subprocess
 import sys
@@ -16,18 +15,6 @@ sys.path.append(os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pard
 import bundles
 import pages
 import tables
-
-
-def arguments():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--program", default="target/release/crumple")
-    parser.add_argument("--structures", default="target/release/structures")
-    parser.add_argument("--scratch", default="target/rotation")
-    parser.add_argument("--example", default="examples/hat-section")
-    parser.add_argument("--fine", default="../shared/data/hat-section-fine")
-    parser.add_argument("--only", nargs="*", help="tables to make, by name")
-    parser.add_argument("--write", help="page whose tables are replaced")
-    return parser.parse_args()
 
 
 def all_bundles(options):
@@ -51,7 +38,7 @@ def all_bundles(options):
 
 
 def main():
-    options = arguments()
+    options = pages.arguments(__doc__, "target/rotation", "tables")
     bench = tables.Bench(options, all_bundles(options))
     made = {}
     for name, make in tables.TABLES.items():
