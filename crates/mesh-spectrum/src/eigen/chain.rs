@@ -11,18 +11,22 @@ use crate::eigen::krylov::Handover;
 use crate::eigen::slice::{CUT_GAP, Demand, Tools, Trouble, slice};
 use crate::eigen::weyl::Weyl;
 
-/// Pairs on either side of a shift. Fewer: more factorisations, which cost more beside a solve the larger the mesh;
-/// more: larger spaces. Between 12 and 20 the time is flat to a tenth.
-fn pairs_a_side(rows: usize) -> usize {
+/// Pairs of a slice. Fewer: more factorisations, which cost more beside a solve the larger the mesh; more: a longer way
+/// from shift to shift, by the square of which errors of the vectors handed over are multiplied.
+fn pairs_a_slice(rows: usize) -> usize {
     match rows {
-        ..30_000 => 14,
-        30_000..300_000 => 16,
-        _ => 20,
+        ..30_000 => 30,
+        30_000..300_000 => 32,
+        _ => 40,
     }
 }
 
-/// Ritz vectors handed over, for each pair on a side: those that the next slice finds again, and those that help.
-const HAND_OVER: usize = 4;
+/// Ritz vectors handed over.
+const HAND_OVER: usize = 64;
+
+/// The share of a slice's pairs that lie below its shift, if there was a hand-over. Those are all but found already, so
+/// that the shift belongs where the others are. (With one half, a slice takes a third more solves.)
+const SHARE_BELOW: f64 = 0.9;
 
 /// The largest |L| and the smallest |D| (in mean spacings of eigenvalues) a shift is used with: above and below, the
 /// solve loses digits (measured: 10 % of the shifts are moved).
@@ -69,11 +73,11 @@ pub(crate) fn blocks_needed(rows: usize, pairs: usize) -> usize {
 
 /// About so many slices find so many pairs.
 pub(crate) fn slices_expected(rows: usize, pairs: usize) -> usize {
-    ((pairs as f64 / (2 * pairs_a_side(rows)) as f64).round() as usize).max(1)
+    ((pairs as f64 / pairs_a_slice(rows) as f64).round() as usize).max(1)
 }
 
 fn slices_max(rows: usize, pairs: usize) -> usize {
-    pairs / pairs_a_side(rows) + 4
+    2 * pairs / pairs_a_slice(rows) + 4
 }
 
 /// Finds the pairs of a span and writes their vectors into `blocks`.
@@ -97,21 +101,28 @@ pub(crate) fn chain(
     for number in 0..slices_max(rows, end - first) {
         let left_over = end - below;
         let slices = slices_expected(rows, left_over);
-        let half = left_over.div_ceil(2 * slices).max(2);
-        let wanted = guess(&ahead, half).unwrap_or_else(|| {
-            let place = weyl.inverse((below + half) as f64) - weyl.inverse(below as f64);
+        let pairs = left_over.div_ceil(slices).max(4);
+        let alone = handover.is_none();
+        let under = if alone { pairs / 2 } else { (SHARE_BELOW * pairs as f64) as usize };
+        let wanted = guess(&ahead, under).unwrap_or_else(|| {
+            let place = weyl.inverse((below + under) as f64) - weyl.inverse(below as f64);
             (low + place).min(0.5 * (low + high))
         });
         let seed = mix(seed, number as u64);
-        let factor = place_shift(tools, symbolic, wanted, (below, half), (low, high), attempt + again)?;
+        let factor = place_shift(tools, symbolic, wanted, (below, under), (low, high), attempt + again)?;
         let nu = factor.below;
         found.counts.push((factor.shift, nu));
         let left = nu.min(end) - below;
-        let last = slices == 1 || nu + left.max(half) + half / 3 >= end;
-        let right = if last { end.saturating_sub(nu) } else { left.max(half).min(end - nu) };
+        let over = if alone { left.max(under) } else { pairs.saturating_sub(left).max(2) };
+        let last = slices == 1 || nu + over + pairs / 6 >= end;
+        let right = if last { end.saturating_sub(nu) } else { over.min(end - nu) };
         let careful = attempt + again > 0;
-        let alone = handover.is_none();
-        let demand = Demand { left: nu - below, right, last, seed, careful, dimension: dimension.filter(|_| !careful) };
+        let foreseen = match attempt {
+            0 => dimension.filter(|_| !careful),
+            // If pairs were missing: the copies of an eigenvalue beyond a block's width come late, out of rounding.
+            _ => Some(64 * attempt + 100 + 3 * (nu - below + right)),
+        };
+        let demand = Demand { left: nu - below, right, last, seed, careful, dimension: foreseen };
         let done = slice(tools, &factor, demand, handover.take()).and_then(|slice| {
             let count = slice.eigenvalues.len();
             let own = blocks.get_mut(..count.div_ceil(WIDTH));
@@ -126,8 +137,8 @@ pub(crate) fn chain(
             }
             done => done?,
         };
-        // What a slice needed is what the next one will need; one without a hand-over needs more.
-        dimension = Some(if alone { slice.dimension * 4 / 5 } else { slice.dimension });
+        // What a slice needed is what the next one will need, unless it had to start from nothing.
+        dimension = Some(if alone { HAND_OVER + 2 * pairs } else { slice.dimension });
         again = 0;
 
         // The slice before knew which eigenvalue comes next. Another one here means that one of both missed a pair.
@@ -159,36 +170,36 @@ pub(crate) fn chain(
         if attempt > 0 {
             drop(slice);
         } else {
-            handover = Some(slice.hand_over(HAND_OVER * half)?);
+            handover = Some(slice.hand_over(HAND_OVER)?);
         }
         symbolic.recycle(factor);
     }
     Err(Trouble::Again("more slices than foreseen".into()))
 }
 
-/// The middle of the widest gap near the place of number `half` among values that may be eigenvalues.
-fn guess(ahead: &[f64], half: usize) -> Option<f64> {
+/// The middle of the widest gap near the place of number `under` among values that may be eigenvalues.
+fn guess(ahead: &[f64], under: usize) -> Option<f64> {
     let reliable = &ahead[..ahead.len() * 2 / 3];
-    if reliable.len() < half + 2 {
+    if reliable.len() < under + 2 {
         return None;
     }
-    let (from, to) = ((half - half / 6).max(1), (half + half / 6).min(reliable.len() - 1));
+    let (from, to) = ((under - under / 6).max(1), (under + under / 6).min(reliable.len() - 1));
     let gap = |k: usize| reliable[k] - reliable[k - 1];
     let widest = (from..=to).max_by(|&a, &b| gap(a).total_cmp(&gap(b)))?;
     Some(0.5 * (reliable[widest] + reliable[widest - 1]))
 }
 
-/// Factors at a shift near the one wanted that has about `half` more eigenvalues below it than `below`, and is no
+/// Factors at a shift near the one wanted that has about `under` more eigenvalues below it than `below`, and is no
 /// closer to one of them than is good for the factor.
 fn place_shift(
     tools: &Tools,
     symbolic: &Symbolic,
     wanted: f64,
-    (below, half): (usize, usize),
+    (below, under): (usize, usize),
     (mut low, mut high): (f64, f64),
     attempt: usize,
 ) -> Result<Factor, Trouble> {
-    let spacing = (wanted - low).max(1e-9 * tools.top) / half as f64;
+    let spacing = (wanted - low).max(1e-9 * tools.top) / under as f64;
     let mut shift = (wanted + 0.21 * spacing * attempt as f64).min(high);
     let mut best: Option<Factor> = None;
     let (mut narrow, mut usable) = (false, 0);
@@ -200,7 +211,7 @@ fn place_shift(
         };
         let nu = factor.below;
         let good = factor.growth < GROWTH_MAX && factor.pivot_min > PIVOT_MIN * spacing;
-        if nu <= below || (nu - below > 2 * half + 8 && !narrow) {
+        if nu <= below || (nu - below > 2 * under + 8 && !narrow) {
             symbolic.recycle(factor);
             if best.is_some() {
                 break;
@@ -211,7 +222,7 @@ fn place_shift(
                 high = shift
             }
             // Newton's method on the counting function, or halving the bracket.
-            let newton = shift + ((below + half) as f64 - nu as f64) * spacing;
+            let newton = shift + ((below + under) as f64 - nu as f64) * spacing;
             shift = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
             if high - low < CUT_GAP * tools.top {
                 (narrow, shift) = (true, high + CUT_GAP * tools.top); // a cluster larger than a slice: take it whole

@@ -47,6 +47,9 @@ const NEAREST_AT: [usize; 2] = [96, 192];
 /// What is left of a block beside what was taken away, if one pass of Gram-Schmidt is to be enough.
 const ONE_PASS: f64 = 1e-3;
 
+/// By how much ‖Op‖ may be larger than the Ritz values that a space starts with say.
+const UNKNOWN: f64 = 4.0;
+
 /// Rows that are combined between two questions whether to stop.
 const ROWS_AT_ONCE: usize = 1 << 15;
 
@@ -71,7 +74,9 @@ pub(crate) struct Krylov<'a> {
     every_step: bool,
     /// Blocks of X nearest to the shift.
     nearest_kept: Range<usize>,
-    /// The same, where there is no X: Ritz vectors of this space, and how often they have been formed.
+    /// The largest |μ⁻¹|.
+    nearest_value: f64,
+    /// The same as `nearest_kept`, where there is no X: Ritz vectors of this space, and how often they have been formed.
     nearest: Vec<Block>,
     nearest_formed: usize,
     random: ChaCha8Rng,
@@ -120,6 +125,7 @@ impl<'a> Krylov<'a> {
             loss: Loss::default(),
             every_step: careful,
             nearest_kept: 0..0,
+            nearest_value: 0.0,
             nearest: Vec::new(),
             nearest_formed: 0,
             random: ChaCha8Rng::seed_from_u64(seed),
@@ -135,8 +141,10 @@ impl<'a> Krylov<'a> {
                     Start { value, g: s.map(|s| s / theta * value) }
                 })
                 .collect();
-            let distance = |k: &usize| 1.0 / space.start[*k].value.abs();
-            let closest = (0..kept).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0) / WIDTH;
+            let value = |k: usize| space.start[k].value.abs();
+            let closest = (0..kept).max_by(|&a, &b| value(a).total_cmp(&value(b))).unwrap_or(0);
+            space.nearest_value = if kept > 0 { value(closest) } else { 0.0 };
+            let closest = closest / WIDTH;
             let first = closest.saturating_sub(NEAREST / 2);
             space.nearest_kept = first..(first + NEAREST).min(kept / WIDTH);
             space.loss = loss.next(WIDTH * space.nearest_kept.start..WIDTH * space.nearest_kept.end);
@@ -156,6 +164,11 @@ impl<'a> Krylov<'a> {
     /// m: the dimension of the projected problem.
     pub(crate) fn dimension(&self) -> usize {
         if self.steps == 0 { 0 } else { self.kept + WIDTH * self.steps }
+    }
+
+    /// Whether solves at this shift lose too many digits, as far as the first steps from random vectors tell.
+    pub(crate) fn is_noisy(&self) -> bool {
+        self.kept == 0 && self.loss.is_noisy()
     }
 
     /// The space can grow by another block.
@@ -229,6 +242,9 @@ impl<'a> Krylov<'a> {
         }
         let r = self.orthonormalise(&mut w, square);
         self.project(&along, &alpha, &r);
+
+        // An eigenvalue much closer to the shift than any known: what is lost along its vector cannot be foreseen.
+        self.every_step |= self.kept > 0 && coupled && self.scale > UNKNOWN * self.nearest_value;
 
         let before = std::mem::replace(&mut self.coupling, r);
         let columns = WIDTH * self.basis.len();

@@ -24,6 +24,15 @@ const ROUNDING: f64 = 2e-16;
 /// How much of the noise counts: until it has been compared with what was measured, at least, and at most.
 const SHARE: [f64; 3] = [1.0, 1e-4, 100.0];
 
+/// What a repair may multiply the share by, at least: the first one of a space says little.
+const LEARNT: f64 = 0.1;
+
+/// The share that a space starts with, at least, whatever the one before it has learnt: its noise may be of another kind.
+const AGAIN: f64 = 0.3;
+
+/// The noise of solves, relative to α, above which another shift is better: usual are 1e-12 to 1e-11.
+const NOISE_MAX: f64 = 5e-11;
+
 /// By how much the estimate is to stay above what is measured.
 const IN_HAND: f64 = 2.0;
 
@@ -40,6 +49,8 @@ pub(crate) struct Loss {
     deflated: Vec<Vec<f64>>,
     /// The share of the noise that is not along them, by what repairs have measured.
     share: Option<f64>,
+    /// The noise of each step, relative to its α.
+    relative: Vec<f64>,
     /// The estimate of the last step; none right after a repair.
     estimate: Option<f64>,
     /// For each column that the space started with, the error of what is known of its product with Op.
@@ -51,7 +62,11 @@ impl Loss {
     /// For a space that starts with vectors of this one's, and orthogonalises every block against those columns.
     pub(crate) fn next(&self, deflated: Range<usize>) -> Loss {
         let unit = |k: usize| (0..=k).map(|i| if i == k { 1.0 } else { 0.0 }).collect();
-        Loss { deflated: deflated.map(unit).collect(), share: self.share, ..Loss::default() }
+        Loss {
+            deflated: deflated.map(unit).collect(),
+            share: self.share.map(|share| share.max(AGAIN)),
+            ..Loss::default()
+        }
     }
 
     /// Every block is orthogonalised along these combinations of columns from now on.
@@ -73,7 +88,7 @@ impl Loss {
     /// Learns from what a repair has measured how much of the noise counts.
     pub(crate) fn compare(&mut self, measured: f64) {
         if let Some(estimate) = self.estimate {
-            let share = self.share.unwrap_or(SHARE[0]) * IN_HAND * measured / estimate;
+            let share = self.share.unwrap_or(SHARE[0]) * (IN_HAND * measured / estimate).max(LEARNT);
             self.share = Some(share.clamp(SHARE[1], SHARE[2]));
         }
     }
@@ -81,11 +96,19 @@ impl Loss {
     /// Notes the asymmetry of a computed α.
     pub(crate) fn measure(&mut self, alpha: &Small) {
         // The first blocks are long in the directions that solves lose most in; their noise is soon gone.
-        self.noise *= 0.3;
-        for ((i, row), turned) in alpha.iter().enumerate().zip(transpose(alpha)) {
-            self.noise = row.iter().zip(turned).fold(self.noise, |most, (a, b)| most.max((a - b).abs()));
-            self.scale = self.scale.max(row[i].abs());
-        }
+        let turned = transpose(alpha);
+        let entries = || alpha.as_flattened().iter().zip(turned.as_flattened());
+        let asymmetry = entries().fold(0.0f64, |most, (a, b)| most.max((a - b).abs()));
+        let size = entries().fold(0.0f64, |most, (a, _)| most.max(a.abs()));
+        self.noise = (0.3 * self.noise).max(asymmetry);
+        self.relative.push(asymmetry / size);
+        self.scale = (0..WIDTH).fold(self.scale, |most, i| most.max(alpha[i][i].abs()));
+    }
+
+    /// Whether five steps from random vectors, the first two not counted, have shown more noise than a slice's vectors
+    /// can bear: factors of equal growth differ a hundredfold in it.
+    pub(crate) fn is_noisy(&self) -> bool {
+        self.relative.len() == 5 && self.relative[2..].iter().sum::<f64>() > 3.0 * NOISE_MAX
     }
 
     /// Notes by how much the product with a column that the space started with is not what it was taken for.

@@ -49,12 +49,12 @@ pub(crate) struct Demand {
 
 /// A slice that has found its pairs, and how to get at their vectors.
 pub(crate) struct Slice<'a> {
+    factor: &'a Factor,
     space: Krylov<'a>,
     ritz: Ritz,
     chosen: Vec<usize>,
     /// Ritz values above the chosen ones, the closest first.
     beyond: Vec<usize>,
-    shift: f64,
     /// Ascending.
     pub(crate) eigenvalues: Vec<f64>,
     /// The dimension at which the pairs were there, about.
@@ -86,15 +86,29 @@ pub(crate) fn slice<'a>(
     let Demand { left, right, last, seed, careful, dimension: foreseen } = demand;
     let mut space = Krylov::new(*tools, factor, seed, handover, careful);
     // Measured on sheet meshes. A space a little too large costs a step, one too small another projected problem.
-    let mut next = foreseen.unwrap_or(90 + 12 * (left + right) / 5 + left.abs_diff(right));
+    let mut next = foreseen.unwrap_or(90 + 2 * (left + right) + left.abs_diff(right));
+    let (mut rate, mut before) = (RATE, None);
     loop {
         tools.progress.go_on()?;
         space.step()?;
+        if !careful && space.is_noisy() {
+            return Err(Trouble::Again(format!("solves at the shift {:e} lose too many digits", factor.shift)));
+        }
         if space.dimension() < next && space.can_grow() {
             continue;
         }
         let ritz = space.ritz().ok_or_else(|| Trouble::Again("the projected problem did not converge".into()))?;
-        let (below, above, all_above) = converged(&ritz, tools);
+        let [all_below, all_above] = sides(&ritz);
+        let excess_of = |k: &usize| excess(&ritz, tools, *k);
+        let [below, above] = [&all_below, &all_above]
+            .map(|side| side.iter().copied().take_while(|k| excess_of(k) <= 1.0).collect::<Vec<usize>>());
+        let wanted = all_below.iter().take(left).chain(all_above.iter().take(right + usize::from(!last)));
+        let excess = wanted.map(excess_of).fold(0.0, f64::max);
+        let dimension = space.dimension();
+        if let Some((at, before)) = before.replace((dimension, excess)) {
+            let steps = (dimension - at) as f64 / WIDTH as f64;
+            rate = (before / excess).powf(1.0 / steps).clamp(RATES[0], RATES[1]);
+        }
         let eigenvalue = |&k: &usize| factor.shift + 1.0 / ritz.values[k];
         let enough = if last { above.len() >= right } else { above.len() > right };
         let cut = (below.len() >= left && enough)
@@ -104,39 +118,45 @@ pub(crate) fn slice<'a>(
             let mut chosen: Vec<usize> = below[..left].iter().rev().copied().collect();
             chosen.extend(&above[..cut]);
             let eigenvalues = chosen.iter().map(eigenvalue).collect();
-            // Pairs that have converged beyond those wanted say that a smaller space would have done.
-            let surplus = (below.len() - left).min(above.len() - right);
-            let (dimension, beyond) = (space.dimension().saturating_sub(2 * surplus), all_above[cut..].to_vec());
-            return Ok(Slice { space, ritz, chosen, beyond, shift: factor.shift, eigenvalues, dimension });
+            let surplus = (-excess.ln() / rate.ln()).clamp(0.0, STEPS as f64) as usize;
+            let (dimension, beyond) = (dimension - WIDTH * surplus, all_above[cut..].to_vec());
+            return Ok(Slice { factor, space, ritz, chosen, beyond, eigenvalues, dimension });
         }
-        let dimension = space.dimension();
         if !space.can_grow() || dimension > 400 + 20 * (left + right) {
             let (below, above, shift) = (below.len(), above.len(), factor.shift);
             return Err(Trouble::Again(format!(
                 "{below} of {left} pairs below and {above} of {right} above the shift {shift:e} after {dimension} vectors"
             )));
         }
-        let missing = left.saturating_sub(below.len()).max((right + usize::from(!last)).saturating_sub(above.len()));
-        next = dimension + (2 * missing).clamp(8, 48);
+        let steps = (excess.ln() / rate.ln()).ceil() as usize; // not a number: 0
+        next = dimension + WIDTH * steps.clamp(1, STEPS);
     }
 }
 
-/// Converged Ritz values below and above the shift, the closest first, up to the first that has not converged; and all
-/// above it.
-fn converged(ritz: &Ritz, tools: &Tools) -> (Vec<usize>, Vec<usize>, Vec<usize>) {
+/// By what a step divides a residual, until it is known; between what it is believed.
+const RATE: f64 = 7.0;
+const RATES: [f64; 2] = [2.0, 20.0];
+
+/// The most steps that are taken, or saved the next time, on the word of such an extrapolation.
+const STEPS: usize = 4;
+
+/// The residual of a Ritz value beside the one allowed. Its square in θ is the residual in A after the inverse step; the
+/// other keeps the vectors orthogonal and the order of the values right.
+fn excess(ritz: &Ritz, tools: &Tools, k: usize) -> f64 {
+    let (theta, beta) = (ritz.values[k].abs(), ritz.residual(k));
+    (beta / (10.0 * tools.tolerance * theta)).max(beta / (0.3 * tools.tolerance * tools.top * theta * theta))
+}
+
+/// The Ritz values below the shift and above it, the closest first.
+fn sides(ritz: &Ritz) -> [Vec<usize>; 2] {
     let values = &ritz.values;
-    let good = |&k: &usize| {
-        let (theta, beta) = (values[k].abs(), ritz.residual(k));
-        // The second is the residual in A after the inverse step; the first keeps the vectors orthogonal and the
-        // order of the values right.
-        beta <= 10.0 * tools.tolerance * theta && beta <= 0.3 * tools.tolerance * tools.top * theta * theta
-    };
-    let mut below: Vec<usize> = (0..values.len()).filter(|&k| values[k] < 0.0).collect();
-    let mut above: Vec<usize> = (0..values.len()).filter(|&k| values[k] > 0.0).collect();
+    let [mut below, mut above]: [Vec<usize>; 2] = [Vec::new(), Vec::new()];
+    for (k, value) in values.iter().enumerate() {
+        if *value < 0.0 { below.push(k) } else { above.push(k) }
+    }
     below.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
     above.sort_by(|&a, &b| values[b].total_cmp(&values[a]));
-    let converged = above.iter().copied().take_while(good).collect();
-    (below.into_iter().take_while(good).collect(), converged, above)
+    [below, above]
 }
 
 /// How many of the pairs above the shift to take, about `right`: up to the widest gap there is among the converged.
@@ -150,7 +170,7 @@ fn cut(above: &[usize], eigenvalue: &dyn Fn(&usize) -> f64, right: usize, least:
 impl Slice<'_> {
     /// Eigenvalues that may lie above the slice, ascending: the nearest third have mostly converged.
     pub(crate) fn ahead(&self) -> Vec<f64> {
-        self.beyond.iter().map(|&k| self.shift + 1.0 / self.ritz.values[k]).collect()
+        self.beyond.iter().map(|&k| self.factor.shift + 1.0 / self.ritz.values[k]).collect()
     }
 
     /// Writes the vectors into blocks of eight, the last one filled up with zeros, and makes their residuals small.
@@ -160,7 +180,8 @@ impl Slice<'_> {
         tools.progress.clock.time(Step::Vectors, || {
             let mut scratch = tools.pool.take(tools.matrix.rows() + 1);
             let blocks = into.iter_mut().zip(self.eigenvalues.chunks(WIDTH));
-            let residuals = blocks.map(|(block, eigenvalues)| settle(tools, block, eigenvalues, &mut scratch));
+            let residuals =
+                blocks.map(|(block, eigenvalues)| settle(tools, self.factor, block, eigenvalues, &mut scratch));
             let residuals = residuals.collect::<Result<Vec<_>, Trouble>>();
             tools.pool.give([scratch]);
             Ok(residuals?.concat())
@@ -178,38 +199,80 @@ impl Slice<'_> {
 /// eigenvalue lose.
 pub(crate) const ROUNDING: f64 = 8.0 * 4e-16;
 
-/// How often vectors are polished, at most: each time takes a digit of the noise away.
-const POLISH_MAX: usize = 3;
+/// The most that is borne, where nothing makes it less: 36 times the rounding of one number.
+const ROUNDING_MAX: f64 = 20.0 * 4e-16;
 
-/// Where the part of the spectrum begins that polishing damps, as a share of ‖A‖; the least and the largest degree of
-/// its polynomial.
+/// How often vectors are improved, at most, and which of these times, from 0, is a step of inverse iteration.
+const POLISH_MAX: usize = 5;
+const CORRECT_AT: usize = 3;
+
+/// Where the part of the spectrum begins that polishing damps, as a share of ‖A‖; the least and the
+/// largest degree of its polynomial.
 const POLISH_FROM: f64 = 0.125;
 const POLISH_DEGREE: [usize; 2] = [4, 12];
 
-/// Polishes a block of vectors if their residuals ask for it; returns these.
-fn settle(tools: &Tools, block: &mut [Row], eigenvalues: &[f64], scratch: &mut [Row]) -> Result<Vec<f64>, Trouble> {
+/// Makes the residuals of a block of vectors small, if they are not; returns them.
+fn settle(
+    tools: &Tools,
+    factor: &Factor,
+    block: &mut [Row],
+    eigenvalues: &[f64],
+    scratch: &mut [Row],
+) -> Result<Vec<f64>, Trouble> {
     let Tools { matrix, kind, norm, .. } = *tools;
     // A tenth in hand, because λ_K lies a little below the top; and no less than rounding leaves.
     let allowed = (0.9 * tools.tolerance * tools.top).max(ROUNDING * norm);
     let mut shifts = ZERO;
     shifts[..eigenvalues.len()].copy_from_slice(eigenvalues);
-    let mut polished = 0;
-    loop {
-        tools.progress.go_on()?;
+    let measure = |block: &[Row]| {
         let mut squares = ZERO;
         kernel::residual(kind, matrix, block, &shifts, &mut squares);
-        let most = squares.into_iter().fold(0.0, f64::max).sqrt();
-        if most <= 0.5 * allowed || (polished == POLISH_MAX && most <= allowed) {
-            return Ok(squares[..eigenvalues.len()].iter().map(|square| square.sqrt()).collect());
+        (squares.map(f64::sqrt), squares.into_iter().fold(0.0, f64::max).sqrt())
+    };
+    for polished in 0.. {
+        tools.progress.go_on()?;
+        let (residuals, most) = measure(block);
+        let last = polished == POLISH_MAX;
+        if most <= allowed || (last && most <= ROUNDING_MAX * norm) {
+            return Ok(residuals[..eigenvalues.len()].to_vec());
         }
-        if polished == POLISH_MAX || squares.iter().any(|square| square.is_nan()) {
+        if last || residuals.iter().any(|residual| residual.is_nan()) {
             return Err(Trouble::Again(format!("residual {most:e}, {allowed:e} allowed")));
+        }
+        if polished == CORRECT_AT {
+            step(tools, factor, block, &shifts, scratch);
+            if measure(block).1 >= most {
+                add(block, scratch, 1.0); // the factor is worse than the vectors
+            }
+            continue;
         }
         // |T_d| outside [−1, 1] is the hyperbolic cosine of d times that of T_1's inverse.
         let outside = ((1.0 + POLISH_FROM) / (1.0 - POLISH_FROM)).acosh();
         let degree = ((most / (0.3 * allowed)).acosh() / outside).ceil() as usize;
         polish(tools, block, eigenvalues, degree.clamp(POLISH_DEGREE[0], POLISH_DEGREE[1]), scratch);
-        polished += 1;
+    }
+    unreachable!("the loop returns")
+}
+
+/// x ← x − d with d = (A − σI)⁻¹ (A − λI) x, a step of inverse iteration: takes away what lies farther from the shift
+/// than λ does, be it at frequencies that polishing must leave alone. `scratch` becomes d.
+fn step(tools: &Tools, factor: &Factor, block: &mut [Row], eigenvalues: &Row, scratch: &mut [Row]) {
+    kernel::sparse(tools.kind, tools.matrix, block, scratch, [1.0, 0.0, 0.0]);
+    for (r, x) in scratch.iter_mut().zip(&*block) {
+        for k in 0..WIDTH {
+            r[k] -= eigenvalues[k] * x[k];
+        }
+    }
+    kernel::solve(tools.kind, &factor.packed, scratch);
+    add(block, scratch, -1.0);
+}
+
+/// X += c Y.
+fn add(x: &mut [Row], y: &[Row], c: f64) {
+    for (x, y) in x.iter_mut().zip(y) {
+        for k in 0..WIDTH {
+            x[k] += c * y[k];
+        }
     }
 }
 
