@@ -15,14 +15,14 @@ use crate::eigen::weyl::Weyl;
 /// from shift to shift, by the square of which errors of the vectors handed over are multiplied.
 fn pairs_a_slice(rows: usize) -> usize {
     match rows {
-        ..30_000 => 30,
-        30_000..300_000 => 32,
-        _ => 40,
+        ..30_000 => 32,
+        30_000..300_000 => 36,
+        _ => 44,
     }
 }
 
-/// Ritz vectors handed over.
-const HAND_OVER: usize = 64;
+/// Ritz vectors handed over, for each pair of a slice.
+const HAND_OVER: usize = 2;
 
 /// The share of a slice's pairs that lie below its shift, if there was a hand-over. Those are all but found already, so
 /// that the shift belongs where the others are. (With one half, a slice takes a third more solves.)
@@ -32,6 +32,9 @@ const SHARE_BELOW: f64 = 0.9;
 /// solve loses digits (measured: 10 % of the shifts are moved).
 pub(crate) const GROWTH_MAX: f64 = 1e4;
 pub(crate) const PIVOT_MIN: f64 = 5e-3;
+
+/// How often a slice is tried again before the whole is.
+const AGAIN_MAX: usize = 3;
 
 /// What a chain has to find.
 #[derive(Debug, Clone, Copy)]
@@ -131,14 +134,14 @@ pub(crate) fn chain(
         });
         let (residuals, slice) = match done {
             // Once more with another shift, by itself, and with nothing left to an estimate.
-            Err(Trouble::Again(_)) if again == 0 => {
-                again = 1;
+            Err(Trouble::Again(_)) if again < AGAIN_MAX => {
+                again += 1;
                 continue;
             }
             done => done?,
         };
         // What a slice needed is what the next one will need, unless it had to start from nothing.
-        dimension = Some(if alone { HAND_OVER + 2 * pairs } else { slice.dimension });
+        dimension = Some(if alone { (2 + HAND_OVER) * pairs } else { slice.dimension });
         again = 0;
 
         // The slice before knew which eigenvalue comes next. Another one here means that one of both missed a pair.
@@ -170,7 +173,7 @@ pub(crate) fn chain(
         if attempt > 0 {
             drop(slice);
         } else {
-            handover = Some(slice.hand_over(HAND_OVER)?);
+            handover = Some(slice.hand_over(HAND_OVER * pairs_a_slice(rows))?);
         }
         symbolic.recycle(factor);
     }

@@ -3,6 +3,8 @@
 //! The mass is scaled out: A = M^-½ L M^-½, A v = λ v, φ = M^-½ v. Then M-products are plain dot products,
 //! ‖L φ − λ M φ‖ in the M⁻¹ norm is ‖A v − λ v‖, and Φᵀ M Φ = Vᵀ V. The null vector is known: M^½ 1.
 
+use std::sync::OnceLock;
+
 use faer::{Mat, Side};
 use rayon::prelude::*;
 
@@ -12,6 +14,7 @@ use crate::eigen::chain::{Found, Span, blocks_needed, chain, slices_expected};
 use crate::eigen::factor::{Factor, Symbolic};
 use crate::eigen::kernel::Kind;
 use crate::eigen::order::{elimination_order, permuted};
+use crate::eigen::polish::Levels;
 use crate::eigen::slice::{Tools, Trouble, norm};
 use crate::eigen::weyl::Weyl;
 use crate::eigen::{EigenError, Progress};
@@ -47,6 +50,7 @@ pub(crate) struct Component {
     /// Gershgorin's bound of the largest eigenvalue, 1/ℓ².
     pub(crate) norm: f64,
     symbolic: Option<Symbolic>,
+    levels: OnceLock<Levels>,
 }
 
 /// The lowest pairs of a component.
@@ -85,7 +89,7 @@ impl Component {
         let unit = norm.log2().round().clamp(-1000.0, 1000.0).exp2();
         matrix.values.iter_mut().for_each(|value| *value /= unit);
         let area = dofs.iter().map(|&dof| operator.mass[dof as usize]).sum();
-        Ok(Component { norm, unit, matrix, dofs, root_mass, area, symbolic: None })
+        Ok(Component { norm, unit, matrix, dofs, root_mass, area, symbolic: None, levels: OnceLock::new() })
     }
 
     /// Puts the rows in elimination order and prepares the factorisation.
@@ -105,7 +109,7 @@ impl Component {
     /// Bytes of the matrix and of what was prepared for its factors.
     pub(crate) fn bytes(&self) -> usize {
         let matrix = 12 * self.matrix.columns.len() + 40 * self.rows();
-        matrix + self.symbolic.as_ref().map_or(0, Symbolic::bytes)
+        matrix + Levels::bytes(&self.matrix) + self.symbolic.as_ref().map_or(0, Symbolic::bytes)
     }
 
     /// Bytes of one factorisation at its largest.
@@ -221,7 +225,7 @@ impl Component {
         let weyl = Weyl::through(self.area * self.unit, top, count as f64);
         let spans = self.spans(weyl, top, count, (attempt, seed), progress)?;
         let norm = self.norm / self.unit;
-        let tools = Tools { matrix: &self.matrix, pool, kind, progress, top, tolerance, norm };
+        let tools = Tools { matrix: &self.matrix, levels: &self.levels, pool, kind, progress, top, tolerance, norm };
 
         progress.expect_slices(spans.iter().map(|span| slices_expected(self.rows(), span.end - span.first)).sum());
 

@@ -11,7 +11,7 @@ use crate::eigen::{EigenError, Orthogonality, Progress};
 
 /// Inner products above this share of what is allowed are removed, once one is above `CLEAN_FROM` of it. Slices leave
 /// 1e-12 (inside) to 2e-10 (across a border).
-const CLEAN_ABOVE: f64 = 0.5;
+const CLEAN_ABOVE: f64 = 0.8;
 const CLEAN_FROM: f64 = 0.9;
 
 /// Inner products above this are no rounding: the same eigenspace was taken twice. Below it the vectors span what they

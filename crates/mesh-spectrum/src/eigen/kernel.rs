@@ -9,6 +9,7 @@
 use crate::eigen::block::{Row, SMALL_ZERO, Small, WIDTH, ZERO, add, transpose};
 use crate::eigen::factor::Pivots;
 use crate::eigen::front::{Tree, Workspace, factor_with};
+use crate::eigen::polish::{Levels, chebyshev_with};
 use crate::eigen::solve::{Packed, solve_with};
 use crate::operator::Csr;
 
@@ -265,23 +266,26 @@ fn scale_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>(
     }
 }
 
-/// Y = a·A X + b·X + c·Y for a sparse symmetric A: the product itself, a residual, or a step of a Chebyshev recurrence.
+/// Y = A X for a sparse A.
 #[inline(always)]
 fn sparse_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>(
     matrix: &Csr,
     x: &[Row],
     y: &mut [Row],
-    [a, b, c]: [f64; 3],
 ) {
     for (i, y) in y.iter_mut().enumerate().take(matrix.rows()) {
-        let mut sum = ZERO;
-        for (column, value) in matrix.row(i) {
-            add_scaled::<A>(&mut sum, value, &x[column]);
-        }
-        for k in 0..WIDTH {
-            y[k] = a * sum[k] + b * x[i][k] + c * y[k];
-        }
+        *y = sparse_row::<A>(matrix, i, x);
     }
+}
+
+/// A row of A X.
+#[inline(always)]
+pub(crate) fn sparse_row<A: Arithmetic>(matrix: &Csr, i: usize, x: &[Row]) -> Row {
+    let mut sum = ZERO;
+    for (column, value) in matrix.row(i) {
+        add_scaled::<A>(&mut sum, value, &x[column]);
+    }
+    sum
 }
 
 /// `squares[k]` = ‖A x_k − λ_k x_k‖² for the eight columns of X.
@@ -350,8 +354,12 @@ dispatched! {
     recur = recur_with(q: &[&[Row]], c: &[Small], w: &mut [Row], p: &[&[Row]], out: &mut [Small]);
     /// W = W C in place.
     scale = scale_with(c: &Small, w: &mut [Row]);
-    /// Y = a·A X + b·X + c·Y for a sparse symmetric A.
-    sparse = sparse_with(matrix: &Csr, x: &[Row], y: &mut [Row], abc: [f64; 3]);
+    /// Y = A X for a sparse A.
+    sparse = sparse_with(matrix: &Csr, x: &[Row], y: &mut [Row]);
+    /// A Chebyshev polynomial of A, and the residuals of what it makes.
+    chebyshev = chebyshev_with(
+        levels: &Levels, degree: usize, line: [f64; 2], x: &mut [Row], y: &mut [Row], eigenvalues: &Row, squares: &mut Row
+    );
     /// `squares[k]` = ‖A x_k − λ_k x_k‖² for the eight columns of X.
     residual = residual_with(matrix: &Csr, x: &[Row], eigenvalues: &Row, squares: &mut Row);
     /// L D Lᵀ = A − σI.

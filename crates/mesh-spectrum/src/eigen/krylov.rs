@@ -144,8 +144,9 @@ impl<'a> Krylov<'a> {
             let value = |k: usize| space.start[k].value.abs();
             let closest = (0..kept).max_by(|&a, &b| value(a).total_cmp(&value(b))).unwrap_or(0);
             space.nearest_value = if kept > 0 { value(closest) } else { 0.0 };
-            let closest = closest / WIDTH;
-            let first = closest.saturating_sub(NEAREST / 2);
+            // The blocks whose middle is next to it.
+            let first =
+                ((closest + WIDTH / 2) / WIDTH).saturating_sub(NEAREST / 2).min((kept / WIDTH).saturating_sub(NEAREST));
             space.nearest_kept = first..(first + NEAREST).min(kept / WIDTH);
             space.loss = loss.next(WIDTH * space.nearest_kept.start..WIDTH * space.nearest_kept.end);
             space.basis = x;

@@ -2,10 +2,13 @@
 //!
 //! A slice knows from an inertia count how many pairs it has to find on its left, and runs until it has them.
 
-use crate::eigen::block::{Pool, Row, WIDTH, ZERO};
+use std::sync::OnceLock;
+
+use crate::eigen::block::{Block, Pool, Row, WIDTH, ZERO};
 use crate::eigen::factor::Factor;
 use crate::eigen::kernel::{self, Kind};
 use crate::eigen::krylov::{Handover, Krylov};
+use crate::eigen::polish::{Levels, polish};
 use crate::eigen::projected::Ritz;
 use crate::eigen::seconds::Step;
 use crate::eigen::{EigenError, Progress};
@@ -19,6 +22,8 @@ pub(crate) const CUT_GAP: f64 = 1e-6;
 #[derive(Clone, Copy)]
 pub(crate) struct Tools<'a> {
     pub(crate) matrix: &'a Csr,
+    /// The same for polishing, once a slice has needed it.
+    pub(crate) levels: &'a OnceLock<Levels>,
     pub(crate) pool: &'a Pool,
     pub(crate) kind: Kind,
     pub(crate) progress: &'a Progress<'a>,
@@ -178,12 +183,13 @@ impl Slice<'_> {
     pub(crate) fn vectors(&self, tools: &Tools, into: &mut [&mut [Row]]) -> Result<Vec<f64>, Trouble> {
         self.space.vectors(&self.ritz, &self.chosen, into)?;
         tools.progress.clock.time(Step::Vectors, || {
-            let mut scratch = tools.pool.take(tools.matrix.rows() + 1);
+            let n = tools.matrix.rows();
+            let mut scratch = [tools.pool.take(n + 1), tools.pool.take(n + 1)];
             let blocks = into.iter_mut().zip(self.eigenvalues.chunks(WIDTH));
             let residuals =
                 blocks.map(|(block, eigenvalues)| settle(tools, self.factor, block, eigenvalues, &mut scratch));
             let residuals = residuals.collect::<Result<Vec<_>, Trouble>>();
-            tools.pool.give([scratch]);
+            tools.pool.give(scratch);
             Ok(residuals?.concat())
         })
     }
@@ -199,17 +205,8 @@ impl Slice<'_> {
 /// eigenvalue lose.
 pub(crate) const ROUNDING: f64 = 8.0 * 4e-16;
 
-/// The most that is borne, where nothing makes it less: 36 times the rounding of one number.
-const ROUNDING_MAX: f64 = 20.0 * 4e-16;
-
-/// How often vectors are improved, at most, and which of these times, from 0, is a step of inverse iteration.
-const POLISH_MAX: usize = 5;
-const CORRECT_AT: usize = 3;
-
-/// Where the part of the spectrum begins that polishing damps, as a share of ‖A‖; the least and the
-/// largest degree of its polynomial.
-const POLISH_FROM: f64 = 0.125;
-const POLISH_DEGREE: [usize; 2] = [4, 12];
+/// How often vectors are improved, at most: polished, and every second time by a step of inverse iteration.
+const IMPROVE_MAX: usize = 5;
 
 /// Makes the residuals of a block of vectors small, if they are not; returns them.
 fn settle(
@@ -217,7 +214,7 @@ fn settle(
     factor: &Factor,
     block: &mut [Row],
     eigenvalues: &[f64],
-    scratch: &mut [Row],
+    [x, y]: &mut [Block; 2],
 ) -> Result<Vec<f64>, Trouble> {
     let Tools { matrix, kind, norm, .. } = *tools;
     // A tenth in hand, because λ_K lies a little below the top; and no less than rounding leaves.
@@ -227,44 +224,45 @@ fn settle(
     let measure = |block: &[Row]| {
         let mut squares = ZERO;
         kernel::residual(kind, matrix, block, &shifts, &mut squares);
-        (squares.map(f64::sqrt), squares.into_iter().fold(0.0, f64::max).sqrt())
+        squares.map(f64::sqrt)
     };
-    for polished in 0.. {
+    let largest = |residuals: &Row| residuals.iter().fold(0.0, |most: f64, x| most.max(*x));
+    let mut residuals = measure(block);
+    for time in 0.. {
         tools.progress.go_on()?;
-        let (residuals, most) = measure(block);
-        let last = polished == POLISH_MAX;
-        if most <= allowed || (last && most <= ROUNDING_MAX * norm) {
+        let most = largest(&residuals);
+        if most <= allowed {
             return Ok(residuals[..eigenvalues.len()].to_vec());
         }
-        if last || residuals.iter().any(|residual| residual.is_nan()) {
+        if time == IMPROVE_MAX || residuals.iter().any(|residual| residual.is_nan()) {
             return Err(Trouble::Again(format!("residual {most:e}, {allowed:e} allowed")));
         }
-        if polished == CORRECT_AT {
-            step(tools, factor, block, &shifts, scratch);
-            if measure(block).1 >= most {
-                add(block, scratch, 1.0); // the factor is worse than the vectors
+        if time % 2 == 1 {
+            step(tools, factor, block, &shifts, x);
+            residuals = measure(block);
+            if largest(&residuals) >= most {
+                add(block, x, 1.0); // the factor is worse than the vectors
+                residuals = measure(block);
             }
-            continue;
+        } else {
+            let levels = tools.levels.get_or_init(|| Levels::new(matrix));
+            residuals = polish(kind, levels, norm, &shifts, most / (0.3 * allowed), block, [x, y]);
         }
-        // |T_d| outside [−1, 1] is the hyperbolic cosine of d times that of T_1's inverse.
-        let outside = ((1.0 + POLISH_FROM) / (1.0 - POLISH_FROM)).acosh();
-        let degree = ((most / (0.3 * allowed)).acosh() / outside).ceil() as usize;
-        polish(tools, block, eigenvalues, degree.clamp(POLISH_DEGREE[0], POLISH_DEGREE[1]), scratch);
     }
     unreachable!("the loop returns")
 }
 
 /// x ← x − d with d = (A − σI)⁻¹ (A − λI) x, a step of inverse iteration: takes away what lies farther from the shift
-/// than λ does, be it at frequencies that polishing must leave alone. `scratch` becomes d.
-fn step(tools: &Tools, factor: &Factor, block: &mut [Row], eigenvalues: &Row, scratch: &mut [Row]) {
-    kernel::sparse(tools.kind, tools.matrix, block, scratch, [1.0, 0.0, 0.0]);
-    for (r, x) in scratch.iter_mut().zip(&*block) {
+/// than λ does, be it at frequencies that polishing must leave alone. `d` has one row more than x.
+fn step(tools: &Tools, factor: &Factor, x: &mut [Row], eigenvalues: &Row, d: &mut [Row]) {
+    kernel::sparse(tools.kind, tools.matrix, x, d);
+    for (r, x) in d.iter_mut().zip(&*x) {
         for k in 0..WIDTH {
             r[k] -= eigenvalues[k] * x[k];
         }
     }
-    kernel::solve(tools.kind, &factor.packed, scratch);
-    add(block, scratch, -1.0);
+    kernel::solve(tools.kind, &factor.packed, d);
+    add(x, d, -1.0);
 }
 
 /// X += c Y.
@@ -272,35 +270,6 @@ fn add(x: &mut [Row], y: &[Row], c: f64) {
     for (x, y) in x.iter_mut().zip(y) {
         for k in 0..WIDTH {
             x[k] += c * y[k];
-        }
-    }
-}
-
-/// x ← T_d(t(A)) x / T_d(t(λ)) with the Chebyshev polynomial T_d, t mapping [‖A‖/8, ‖A‖] to [−1, 1]: damps the rounding
-/// noise at the upper end of the spectrum, which the residual multiplies by ‖A‖/λ_K, and leaves the pair alone.
-fn polish(tools: &Tools, block: &mut [Row], eigenvalues: &[f64], degree: usize, scratch: &mut [Row]) {
-    let Tools { matrix, kind, norm, .. } = *tools;
-    let (centre, half) = (norm * (1.0 + POLISH_FROM) / 2.0, norm * (1.0 - POLISH_FROM) / 2.0);
-    let [mut before, mut now]: [&mut [Row]; 2] = [block, &mut scratch[..matrix.rows()]];
-    kernel::sparse(kind, matrix, before, now, [1.0 / half, -centre / half, 0.0]);
-    for _ in 1..degree {
-        // T_{d+1} = 2 t T_d − T_{d−1}, in place of T_{d−1}.
-        kernel::sparse(kind, matrix, now, before, [2.0 / half, -2.0 * centre / half, -1.0]);
-        [before, now] = [now, before];
-    }
-    let mut scale = ZERO;
-    for (k, eigenvalue) in eigenvalues.iter().enumerate() {
-        let t = (eigenvalue - centre) / half;
-        let (mut before, mut value) = (1.0, t);
-        for _ in 1..degree {
-            (before, value) = (value, 2.0 * t * value - before);
-        }
-        scale[k] = 1.0 / value;
-    }
-    for (x, y) in before.iter_mut().zip(now.iter_mut()) {
-        for k in 0..WIDTH {
-            let value = y[k] * scale[k];
-            (x[k], y[k]) = (value, value); // one of them is the block
         }
     }
 }
