@@ -79,21 +79,22 @@ pub(crate) fn finish(
         Orthogonality::Standard => (CLEAN_ABOVE * allowed, CLEAN_FROM * allowed),
         Orthogonality::Full => (0.0, 0.0),
     };
-    let mut cleaned = false;
+    let mut touched = vec![false; blocks.len()];
+    touched[0] = true; // it has the null vector now
     for pass in 0..4 {
         // Slivers may need several passes. Full orthogonality is one at least, and more only where it is not yet there.
         if loss <= if pass == 0 { enough } else { enough.max(0.1 * allowed) } {
             break;
         }
         let changed = gram.clean(&mut blocks, &places, above, kind, progress)?;
-        cleaned = true;
+        changed.iter().for_each(|&i| touched[i] = true);
         gram.renew(&changed, &blocks, kind, progress)?;
         loss = gram.loss(&places);
     }
     let scales: Vec<f64> = places.iter().map(|&place| 1.0 / gram.entry(place, place).sqrt()).collect();
 
-    // What was measured before holds where nothing has been changed since: not in the first block, with the null vector.
-    let known = pairs.residuals.as_ref().filter(|_| !cleaned);
+    // What was measured before holds where nothing has been changed since.
+    let known = pairs.residuals.as_ref();
     let mut per_block = vec![Measured { known: 0.0, eigenvalues: ZERO, scales: ZERO }; blocks.len()];
     for (k, (&place, scale)) in places.iter().zip(&scales).enumerate() {
         let block = &mut per_block[place / WIDTH];
@@ -106,7 +107,7 @@ pub(crate) fn finish(
         .zip(&per_block)
         .enumerate()
         .map(|(number, (block, Measured { known: most, eigenvalues, scales }))| {
-            if number > 0 && known.is_some() {
+            if !touched[number] && known.is_some() {
                 return Ok(*most);
             }
             progress.go_on()?;
@@ -207,10 +208,22 @@ impl Gram {
             *self = Gram::of(blocks, kind, progress)?;
             return Ok(());
         }
-        for (&i, out) in changed.iter().zip(products(blocks, changed, |i| (i..i + 1, count), kind, progress)?) {
-            for (k, out) in out.iter().enumerate() {
-                let (low, high) = (k.min(i), k.max(i));
-                self.parts[high * (high + 1) / 2 + low] = if k <= i { *out } else { transpose(out) };
+        // Two neighbours at a time, where both have changed.
+        let mut runs: Vec<Range<usize>> = Vec::new();
+        for &i in changed {
+            match runs.last_mut() {
+                Some(run) if run.end == i && run.len() == 1 => run.end += 1,
+                _ => runs.push(i..i + 1),
+            }
+        }
+        let starts: Vec<usize> = runs.iter().map(|run| run.start).collect();
+        let of = |i: usize| (i..i + runs[starts.partition_point(|&start| start < i)].len(), count);
+        for (run, out) in runs.iter().zip(products(blocks, &starts, of, kind, progress)?) {
+            for (i, out) in run.clone().zip(out.chunks_exact(count)) {
+                for (k, out) in out.iter().enumerate() {
+                    let (low, high) = (k.min(i), k.max(i));
+                    self.parts[high * (high + 1) / 2 + low] = if k <= i { *out } else { transpose(out) };
+                }
             }
         }
         Ok(())
