@@ -109,6 +109,7 @@ fuzz seconds="300":
 # the eigenbasis beside SciPy + CHOLMOD, LaPy, SLEPc and dense `eigh`; needs libsuitesparse-dev, python3-slepc4py and python3-scipy (Debian)
 bench-eigen *options:
     cargo build --release -p mesh-spectrum --example measure
+    cargo build --release -p crumple
     test -x target/bench-eigen/venv/bin/python || python3 -m venv target/bench-eigen/venv
     target/bench-eigen/venv/bin/pip install --quiet --requirement benches/eigen/requirements.txt
     target/bench-eigen/venv/bin/python benches/eigen/run.py --page docs/eigen.md {{ options }}

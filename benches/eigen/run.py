@@ -24,10 +24,24 @@ from statistics import median
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 sys.path.insert(0, str(ROOT / "benches"))
+import numpy as np  # noqa: E402
 import pages  # noqa: E402
 
 MESHES = {"9k": "hat:9000", "100k": "hat:100000", "1M": "hat:1000000", "9k-apart": "hat-apart:9000", "100k-apart": "hat-apart:100000",
           "1M-apart": "hat-apart:1000000", "9k-closed": "closed:9000", "100k-closed": "closed:100000"}
+
+
+def bundle(scratch: Path, crumple: Path) -> Path:
+    """The example bundle's own mesh as OBJ."""
+    mesh, study, exported = scratch / "bundle.obj", scratch / "bundle", scratch / "bundle-exported"
+    if not mesh.exists():
+        run = ROOT / "examples/hat-section/runs/run_001"
+        subprocess.run([crumple, "--quiet", "init", run, "-K", "1", "-o", study], check=True)
+        subprocess.run([crumple, "--quiet", "export", study, "-o", exported], check=True)
+        vertices, triangles = np.load(exported / "vertices.npy"), np.load(exported / "triangles.npy")
+        lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()] + [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in triangles.tolist()]
+        mesh.write_text("\n".join(lines) + "\n")
+    return mesh
 
 
 def environment(threads: int) -> dict[str, str]:
@@ -47,13 +61,14 @@ def once(command: list[str], threads: int, prefix: list[str]) -> dict:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--cases", default="9k/100,9k/500,9k/1000,100k/500")
+    parser.add_argument("--cases", default="9k/100,9k/500,9k/1000,9k-apart/500,9k-closed/500,bundle/500,100k/500")
     parser.add_argument("--threads", default="1,2")
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--peers", default="scipy,slepc,lapy,dense")
     parser.add_argument("--scratch", type=Path, default=ROOT / "target/bench-eigen")
     parser.add_argument("--prefix", default="")
     parser.add_argument("--program", type=Path, default=ROOT / "target/release/examples/measure")
+    parser.add_argument("--crumple", type=Path, default=ROOT / "target/release/crumple", help="reads the mesh of the case bundle/K")
     parser.add_argument("--slepc-python", default="/usr/bin/python3", help="a Python that has slepc4py (Debian: python3-slepc4py)")
     parser.add_argument("--table-only", action="store_true")
     parser.add_argument("--page", type=Path, help="docs/eigen.md")
@@ -64,7 +79,7 @@ def main() -> None:
 
     for case in options.cases.split(",") if not options.table_only else []:
         mesh, count = case.split("/")
-        shape = MESHES.get(mesh, mesh)
+        shape = str(bundle(options.scratch, options.crumple)) if mesh == "bundle" else MESHES.get(mesh, mesh)
         folder = options.scratch / mesh.replace("/", "_")
         if not (folder / "mass.f64").exists():
             subprocess.run([options.program, shape, "1", "--dump", folder], check=True)
