@@ -36,7 +36,7 @@ def bundle(scratch: Path, crumple: Path) -> Path:
     mesh, study, exported = scratch / "bundle.obj", scratch / "bundle", scratch / "bundle-exported"
     if not mesh.exists():
         run = ROOT / "examples/hat-section/runs/run_001"
-        subprocess.run([crumple, "--quiet", "init", run, "-K", "1", "-o", study], check=True)
+        subprocess.run([crumple, "--quiet", "init", "--reference", run, "-K", "2", study], check=True)
         subprocess.run([crumple, "--quiet", "export", study, "-o", exported], check=True)
         vertices, triangles = np.load(exported / "vertices.npy"), np.load(exported / "triangles.npy")
         lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()] + [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in triangles.tolist()]
