@@ -358,7 +358,7 @@ dispatched! {
     sparse = sparse_with(matrix: &Csr, x: &[Row], y: &mut [Row]);
     /// A Chebyshev polynomial of A, and the residuals of what it makes.
     chebyshev = chebyshev_with(
-        levels: &Levels, degree: usize, line: [f64; 2], x: &mut [Row], y: &mut [Row], eigenvalues: &Row, squares: &mut Row
+        levels: &Levels, degree: usize, line: [f64; 2], buffers: [&mut [Row]; 2], eigenvalues: &Row, squares: &mut Row
     );
     /// `squares[k]` = ‖A x_k − λ_k x_k‖² for the eight columns of X.
     residual = residual_with(matrix: &Csr, x: &[Row], eigenvalues: &Row, squares: &mut Row);

@@ -96,17 +96,9 @@ pub(crate) fn polish(
         *to = block[levels.rows[at] as usize];
     }
     let mut squares = ZERO;
-    kernel::chebyshev(
-        kind,
-        levels,
-        degree,
-        [1.0 / half, centre / half],
-        &mut x[..n],
-        &mut y[..n],
-        eigenvalues,
-        &mut squares,
-    );
-    let result = if degree % 2 == 0 { x } else { y };
+    let buffers = [&mut x[..n], &mut y[..n]];
+    kernel::chebyshev(kind, levels, degree, [1.0 / half, centre / half], buffers, eigenvalues, &mut squares);
+    let result = if degree.is_multiple_of(2) { x } else { y };
     let scale = eigenvalues.map(|eigenvalue| {
         let t = (eigenvalue - centre) / half;
         let (mut before, mut value) = (1.0, t);
@@ -124,21 +116,19 @@ pub(crate) fn polish(
     std::array::from_fn(|k| squares[k].sqrt() * scale[k].abs())
 }
 
-/// x and y become T_d(s A − c) x and T_{d−1}(s A − c) x, in the order of the parity of d, for [s, c]; `squares[k]`
-/// becomes ‖A z_k − λ_k z_k‖² of the former.
+/// The buffers, of which the first holds x, become T_d(s A − c) x and T_{d−1}(s A − c) x for [s, c], the even degree in the
+/// first; `squares[k]` becomes ‖A z_k − λ_k z_k‖² of the higher degree, z.
 #[inline(always)]
 pub(crate) fn chebyshev_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>(
     levels: &Levels,
     degree: usize,
     [scale, centre]: [f64; 2],
-    x: &mut [Row],
-    y: &mut [Row],
+    mut buffers: [&mut [Row]; 2],
     eigenvalues: &Row,
     squares: &mut Row,
 ) {
     let count = levels.starts.len() - 1;
     *squares = ZERO;
-    let mut buffers = [x, y];
     for time in 0..count + degree {
         for power in 1..=degree {
             let Some(level) = (time + 1).checked_sub(power).filter(|&level| level < count) else { continue };
