@@ -16,6 +16,7 @@ import argparse
 import json
 import os
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -36,6 +37,7 @@ def bundle(scratch: Path, crumple: Path) -> Path:
     mesh, study, exported = scratch / "bundle.obj", scratch / "bundle", scratch / "bundle-exported"
     if not mesh.exists():
         run = ROOT / "examples/hat-section/runs/run_001"
+        shutil.rmtree(study, ignore_errors=True)  # what a bench that was stopped has left
         subprocess.run([crumple, "--quiet", "init", "--reference", run, "-K", "2", study], check=True)
         subprocess.run([crumple, "--quiet", "export", study, "-o", exported], check=True)
         vertices, triangles = np.load(exported / "vertices.npy"), np.load(exported / "triangles.npy")

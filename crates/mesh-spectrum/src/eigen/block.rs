@@ -99,6 +99,11 @@ pub(crate) fn negative(a: &Small) -> Small {
     a.map(|row| row.map(|x| -x))
 }
 
+/// The largest magnitude.
+pub(crate) fn largest(all: &[Small]) -> f64 {
+    all.as_flattened().as_flattened().iter().fold(0.0, |most, x| x.abs().max(most))
+}
+
 /// A += B.
 #[inline(always)]
 pub(crate) fn add(a: &mut Small, b: &Small) {

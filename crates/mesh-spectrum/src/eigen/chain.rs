@@ -133,7 +133,7 @@ pub(crate) fn chain(
             Ok((slice.vectors(tools, own)?, slice))
         });
         let (residuals, slice) = match done {
-            // Once more with another shift, by itself, and with nothing left to an estimate.
+            // Again with another shift, by itself, and with nothing left to an estimate.
             Err(Trouble::Again(_)) if again < AGAIN_MAX => {
                 again += 1;
                 continue;

@@ -297,17 +297,21 @@ fn residual_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usiz
     squares: &mut Row,
 ) {
     *squares = ZERO;
-    for (i, own) in x.iter().enumerate().take(matrix.rows()) {
-        let mut sum = ZERO;
-        for k in 0..WIDTH {
-            sum[k] = -eigenvalues[k] * own[k];
-        }
-        for (column, value) in matrix.row(i) {
-            add_scaled::<A>(&mut sum, value, &x[column]);
-        }
-        for k in 0..WIDTH {
-            squares[k] = A::fma(sum[k], sum[k], squares[k]);
-        }
+    (0..matrix.rows()).for_each(|i| add_residual::<A>(matrix, i, x, eigenvalues, squares));
+}
+
+/// What row i of the matrix adds to ‖A x_k − λ_k x_k‖².
+#[inline(always)]
+pub(crate) fn add_residual<A: Arithmetic>(matrix: &Csr, i: usize, x: &[Row], eigenvalues: &Row, squares: &mut Row) {
+    let mut sum = ZERO;
+    for k in 0..WIDTH {
+        sum[k] = -eigenvalues[k] * x[i][k];
+    }
+    for (column, value) in matrix.row(i) {
+        add_scaled::<A>(&mut sum, value, &x[column]);
+    }
+    for k in 0..WIDTH {
+        squares[k] = A::fma(sum[k], sum[k], squares[k]);
     }
 }
 

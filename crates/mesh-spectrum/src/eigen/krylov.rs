@@ -23,7 +23,9 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use crate::eigen::EigenError;
-use crate::eigen::block::{Block, Row, SMALL_ZERO, Small, WIDTH, ZERO, add, cholesky, negative, product, transpose};
+use crate::eigen::block::{
+    Block, Row, SMALL_ZERO, Small, WIDTH, ZERO, add, cholesky, largest, negative, product, transpose,
+};
 use crate::eigen::factor::Factor;
 use crate::eigen::kernel::{self, gram_of};
 use crate::eigen::loss::{Loss, uniform};
@@ -74,9 +76,7 @@ pub(crate) struct Krylov<'a> {
     every_step: bool,
     /// Blocks of X nearest to the shift.
     nearest_kept: Range<usize>,
-    /// The largest |μ⁻¹|.
-    nearest_value: f64,
-    /// The same as `nearest_kept`, where there is no X: Ritz vectors of this space, and how often they have been formed.
+    /// The same, where there is no X: Ritz vectors of this space, and how often they have been formed.
     nearest: Vec<Block>,
     nearest_formed: usize,
     random: ChaCha8Rng,
@@ -125,7 +125,6 @@ impl<'a> Krylov<'a> {
             loss: Loss::default(),
             every_step: careful,
             nearest_kept: 0..0,
-            nearest_value: 0.0,
             nearest: Vec::new(),
             nearest_formed: 0,
             random: ChaCha8Rng::seed_from_u64(seed),
@@ -143,7 +142,6 @@ impl<'a> Krylov<'a> {
                 .collect();
             let value = |k: usize| space.start[k].value.abs();
             let closest = (0..kept).max_by(|&a, &b| value(a).total_cmp(&value(b))).unwrap_or(0);
-            space.nearest_value = if kept > 0 { value(closest) } else { 0.0 };
             // The blocks whose middle is next to it.
             let first =
                 ((closest + WIDTH / 2) / WIDTH).saturating_sub(NEAREST / 2).min((kept / WIDTH).saturating_sub(NEAREST));
@@ -245,7 +243,8 @@ impl<'a> Krylov<'a> {
         self.project(&along, &alpha, &r);
 
         // An eigenvalue much closer to the shift than any known: what is lost along its vector cannot be foreseen.
-        self.every_step |= self.kept > 0 && coupled && self.scale > UNKNOWN * self.nearest_value;
+        let known = self.start.iter().fold(0.0f64, |most, start| most.max(start.value.abs()));
+        self.every_step |= coupled && self.scale > UNKNOWN * known;
 
         let before = std::mem::replace(&mut self.coupling, r);
         let columns = WIDTH * self.basis.len();
@@ -474,11 +473,6 @@ impl Drop for Krylov<'_> {
     fn drop(&mut self) {
         self.tools.pool.give(self.basis.drain(..).chain(self.nearest.drain(..)));
     }
-}
-
-/// The largest magnitude.
-fn largest(all: &[Small]) -> f64 {
-    all.as_flattened().as_flattened().iter().fold(0.0, |most, x| x.abs().max(most))
 }
 
 fn norm_of(block: &[Row], column: usize) -> f64 {

@@ -14,7 +14,7 @@ use std::ops::Range;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-use crate::eigen::block::{Row, Small, WIDTH, ZERO, inverse_of_upper, transpose};
+use crate::eigen::block::{Row, Small, WIDTH, ZERO, add, inverse_of_upper, largest, negative, transpose};
 use crate::eigen::kernel::{Plain, add_scaled};
 use crate::eigen::projected::Projected;
 
@@ -95,13 +95,12 @@ impl Loss {
 
     /// Notes the asymmetry of a computed α.
     pub(crate) fn measure(&mut self, alpha: &Small) {
+        let mut asymmetry = negative(&transpose(alpha));
+        add(&mut asymmetry, alpha);
+        let asymmetry = largest(&[asymmetry]);
         // The first blocks are long in the directions that solves lose most in; their noise is soon gone.
-        let turned = transpose(alpha);
-        let entries = || alpha.as_flattened().iter().zip(turned.as_flattened());
-        let asymmetry = entries().fold(0.0f64, |most, (a, b)| most.max((a - b).abs()));
-        let size = entries().fold(0.0f64, |most, (a, _)| most.max(a.abs()));
         self.noise = (0.3 * self.noise).max(asymmetry);
-        self.relative.push(asymmetry / size);
+        self.relative.push(asymmetry / largest(std::slice::from_ref(alpha)));
         self.scale = (0..WIDTH).fold(self.scale, |most, i| most.max(alpha[i][i].abs()));
     }
 

@@ -6,7 +6,7 @@
 //! cache (wavefront blocking; Demmel, Hoemmen, Mohiyuddin and Yelick 2008 call it the matrix powers kernel).
 
 use crate::eigen::block::{Row, WIDTH, ZERO};
-use crate::eigen::kernel::{self, Arithmetic, Kind, prefetch, sparse_row};
+use crate::eigen::kernel::{self, Arithmetic, Kind, add_residual, prefetch, sparse_row};
 use crate::eigen::order::permuted;
 use crate::operator::Csr;
 
@@ -146,11 +146,7 @@ pub(crate) fn chebyshev_with<A: Arithmetic, const R: usize, const HIGH: usize, c
         let Some(level) = time.checked_sub(degree) else { continue };
         let z = &buffers[degree % 2];
         for i in levels.starts[level]..levels.starts[level + 1] {
-            let product = sparse_row::<A>(&levels.matrix, i, z);
-            for k in 0..WIDTH {
-                let r = A::fma(-eigenvalues[k], z[i][k], product[k]);
-                squares[k] = A::fma(r, r, squares[k]);
-            }
+            add_residual::<A>(&levels.matrix, i, z, eigenvalues, squares);
         }
     }
 }

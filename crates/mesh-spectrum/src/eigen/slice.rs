@@ -123,6 +123,7 @@ pub(crate) fn slice<'a>(
             let mut chosen: Vec<usize> = below[..left].iter().rev().copied().collect();
             chosen.extend(&above[..cut]);
             let eigenvalues = chosen.iter().map(eigenvalue).collect();
+            // Steps that could have been saved.
             let surplus = (-excess.ln() / rate.ln()).clamp(0.0, STEPS as f64) as usize;
             let (dimension, beyond) = (dimension - WIDTH * surplus, all_above[cut..].to_vec());
             return Ok(Slice { factor, space, ritz, chosen, beyond, eigenvalues, dimension });
@@ -228,7 +229,8 @@ fn settle(
     };
     let largest = |residuals: &Row| residuals.iter().fold(0.0, |most: f64, x| most.max(*x));
     let mut residuals = measure(block);
-    for time in 0.. {
+    let mut time = 0;
+    loop {
         tools.progress.go_on()?;
         let most = largest(&residuals);
         if most <= allowed {
@@ -248,8 +250,8 @@ fn settle(
             let levels = tools.levels.get_or_init(|| Levels::new(matrix));
             residuals = polish(kind, levels, norm, &shifts, most / (0.3 * allowed), block, [x, y]);
         }
+        time += 1;
     }
-    unreachable!("the loop returns")
 }
 
 /// x ← x − d with d = (A − σI)⁻¹ (A − λI) x, a step of inverse iteration: takes away what lies farther from the shift
