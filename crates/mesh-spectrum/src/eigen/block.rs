@@ -152,8 +152,9 @@ pub(crate) fn inverse_of_upper(r: &Small) -> Small {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::eigen::kernel::Kind;
     use crate::eigen::kernel::tests::block;
-    use crate::eigen::kernel::{Kind, gram_of};
+    use crate::eigen::parts::gram_of;
 
     #[test]
     fn cholesky_gives_a_factor_and_its_inverse() {

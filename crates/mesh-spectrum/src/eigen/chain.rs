@@ -121,25 +121,32 @@ pub(crate) fn chain(
         let right = if last { end.saturating_sub(nu) } else { over.min(end - nu) };
         let careful = attempt + again > 0;
         let foreseen = match attempt {
-            0 => dimension.filter(|_| !careful),
+            0 => dimension.filter(|_| !(careful && alone)),
             // If pairs were missing: the copies of an eigenvalue beyond a block's width come late, out of rounding.
             _ => Some(64 * attempt + 100 + 3 * (nu - below + right)),
         };
         let demand = Demand { left: nu - below, right, last, seed, careful, dimension: foreseen };
-        let done = slice(tools, &factor, demand, handover.take()).and_then(|slice| {
+        let done = slice(tools, &factor, demand, &mut handover).and_then(|slice| {
             let count = slice.eigenvalues.len();
             let own = blocks.get_mut(..count.div_ceil(WIDTH));
             let own = own.ok_or_else(|| Trouble::Again("more slices than foreseen".into()))?;
-            Ok((slice.vectors(tools, own)?, slice))
-        });
-        let (residuals, slice) = match done {
-            // Again with another shift, by itself, and with nothing left to an estimate.
-            Err(Trouble::Again(_)) if again < AGAIN_MAX => {
-                again += 1;
-                continue;
+            match slice.vectors(tools, own) {
+                Ok(residuals) => Ok((residuals, slice)),
+                Err(trouble) => {
+                    handover = slice.give_back();
+                    Err(trouble)
+                }
             }
-            done => done?,
-        };
+        });
+        if matches!(done, Err(Trouble::Again(_))) && again < AGAIN_MAX {
+            // Again with another shift and with nothing left to an estimate; then by itself.
+            again += 1;
+            handover = handover.filter(|_| again == 1);
+            drop(done);
+            symbolic.recycle(factor);
+            continue;
+        }
+        let (residuals, slice) = done?;
         // What a slice needed is what the next one will need, unless it had to start from nothing.
         dimension = Some(if alone { (2 + HAND_OVER) * pairs } else { slice.dimension });
         again = 0;

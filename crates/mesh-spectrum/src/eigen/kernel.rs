@@ -228,7 +228,7 @@ fn update_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>
     }
 }
 
-/// W += Σ_k Q_k C_k, then out_i = P_iᵀ W, or Wᵀ W if no P is given, in one pass.
+/// W += Σ_k Q_k C_k, then out_i = P_iᵀ W and, after them, Wᵀ W, in one pass.
 #[inline(always)]
 fn recur_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>(
     q: &[&[Row]],
@@ -239,30 +239,52 @@ fn recur_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>(
 ) {
     out.fill(SMALL_ZERO);
     let mut part = vec![SMALL_ZERO; out.len()];
-    let (mut q_panels, mut p_panels) = (Vec::with_capacity(q.len()), Vec::with_capacity(p.len()));
+    let mut q_panels = Vec::with_capacity(q.len());
     for (number, w) in w.chunks_mut(PANEL).enumerate() {
         let panel = PANEL * number..PANEL * number + w.len();
-        q_panels.clear();
-        q_panels.extend(q.iter().map(|q| &q[panel.clone()]));
-        update_with::<A, R, HIGH, P>(&q_panels, c, &mut [w], true);
-        p_panels.clear();
-        p_panels.extend(p.iter().map(|p| &p[panel.clone()]));
+        if !q.is_empty() {
+            q_panels.clear();
+            q_panels.extend(q.iter().map(|q| &q[panel.clone()]));
+            update_with::<A, R, HIGH, P>(&q_panels, c, &mut [w], true);
+        }
+        let mut ws = Vec::with_capacity(p.len() + 1);
+        ws.extend(p.iter().map(|p| &p[panel.clone()]));
+        ws.push(&*w);
         // Wᵀ P_i two at a time, and turned at the end: W stays in the first cache.
-        let ws = if p.is_empty() { &[&*w] } else { &p_panels[..] };
-        gram_with::<A, R, HIGH, P>(&[&*w], ws, &mut part);
+        gram_with::<A, R, HIGH, P>(&[&*w], &ws, &mut part);
         out.iter_mut().zip(&part).for_each(|(out, part)| add(out, part));
     }
     out.iter_mut().for_each(|out| *out = transpose(out));
 }
 
-/// W = W C in place.
+/// W = (W + Σ_k Q_k C_k) S, a copy of it unless that is empty, and its Wᵀ W, in one pass.
 #[inline(always)]
-fn scale_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>(c: &Small, w: &mut [Row]) {
+fn scale_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>(
+    q: &[&[Row]],
+    c: &[Small],
+    s: &Small,
+    w: &mut [Row],
+    copy: &mut [Row],
+    square: &mut Small,
+) {
+    *square = SMALL_ZERO;
     let mut before = [ZERO; PANEL];
-    for w in w.chunks_mut(PANEL) {
+    let mut q_panels = Vec::with_capacity(q.len());
+    for (number, w) in w.chunks_mut(PANEL).enumerate() {
+        let panel = PANEL * number..PANEL * number + w.len();
         let before = &mut before[..w.len()];
         before.copy_from_slice(w);
-        update_with::<A, R, HIGH, 1>(&[before], std::slice::from_ref(c), &mut [w], false);
+        if !q.is_empty() {
+            q_panels.clear();
+            q_panels.extend(q.iter().map(|q| &q[panel.clone()]));
+            update_with::<A, R, HIGH, P>(&q_panels, c, &mut [before], true);
+        }
+        update_with::<A, R, HIGH, 1>(&[before], std::slice::from_ref(s), &mut [w], false);
+        let [part] = outer::<A, HIGH, 1>(w, [w]);
+        add(square, &part);
+        if let Some(copy) = copy.get_mut(panel) {
+            copy.copy_from_slice(w);
+        }
     }
 }
 
@@ -354,10 +376,12 @@ dispatched! {
     gram = gram_with(blocks: &[&[Row]], ws: &[&[Row]], out: &mut [Small]);
     /// W_i (+)= Σ_k Q_k C_ki with C_ki = c[i·blocks + k], the layout of `gram`.
     update = update_with(blocks: &[&[Row]], c: &[Small], ws: &mut [&mut [Row]], add: bool);
-    /// W += Σ_k Q_k C_k, then out_i = P_iᵀ W, or Wᵀ W if no P is given, in one pass.
+    /// W += Σ_k Q_k C_k, then out_i = P_iᵀ W and, after them, Wᵀ W, in one pass.
     recur = recur_with(q: &[&[Row]], c: &[Small], w: &mut [Row], p: &[&[Row]], out: &mut [Small]);
-    /// W = W C in place.
-    scale = scale_with(c: &Small, w: &mut [Row]);
+    /// W = (W + Σ_k Q_k C_k) S, a copy of it unless that is empty, and its Wᵀ W, in one pass.
+    scale = scale_with(
+        q: &[&[Row]], c: &[Small], s: &Small, w: &mut [Row], copy: &mut [Row], square: &mut Small
+    );
     /// Y = A X for a sparse A.
     sparse = sparse_with(matrix: &Csr, x: &[Row], y: &mut [Row]);
     /// A Chebyshev polynomial of A, and the residuals of what it makes.
@@ -372,13 +396,6 @@ dispatched! {
     );
     /// X = (L D Lᵀ)⁻¹ X; `x` has one row more than the matrix.
     solve = solve_with(factor: &Packed, x: &mut [Row]);
-}
-
-/// Qᵀ W of two blocks.
-pub(crate) fn gram_of(kind: Kind, q: &[Row], w: &[Row]) -> Small {
-    let mut out = [SMALL_ZERO];
-    gram(kind, &[q], &[w], &mut out);
-    out[0]
 }
 
 #[cfg(test)]
@@ -411,15 +428,27 @@ pub(crate) mod tests {
         seen.extend(ws.concat());
         update(kind, &blocks, &smalls(6, 1), &mut ws.each_mut().map(|w| &mut w[..]), false);
         seen.extend(ws.concat());
-        let (mut w, mut out) = (w, [SMALL_ZERO; 3]);
+        let (mut w, mut out) = (w, [SMALL_ZERO; 4]);
         recur(kind, &blocks, &smalls(2, 2), &mut w, &[&p, &v, &q], &mut out);
         let direct: f64 = v.iter().zip(&w).map(|(v, w)| v[2] * w[6]).sum();
         assert!((out[1][2][6] - direct).abs() <= 1e-15 * rows as f64, "rounding of sums of products below 1");
+        let direct: f64 = w.iter().map(|w| w[3] * w[7]).sum();
+        assert!((out[3][3][7] - direct).abs() <= 1e-15 * rows as f64 * (1.0 + direct.abs()), "the same of more terms");
         seen.extend(out.concat());
-        recur(kind, &blocks[..1], &smalls(1, 7), &mut w, &[], &mut out[..1]);
+        recur(kind, &[], &[], &mut w, &[], &mut out[..1]);
         seen.extend(out[0]);
-        scale(kind, &smalls(1, 3)[0], &mut w);
+        let (s, c, before, mut copy) = (smalls(1, 3)[0], smalls(2, 7), w.clone(), vec![ZERO; rows]);
+        let mut square = SMALL_ZERO;
+        scale(kind, &blocks, &c, &s, &mut w, &mut copy, &mut square);
+        let direct: f64 = w.iter().map(|w| w[2] * w[4]).sum();
+        assert!((square[2][4] - direct).abs() <= 1e-15 * rows as f64 * (1.0 + direct.abs()), "the same in another order");
+        let taken = |k: usize| (0..WIDTH).map(|a| q[0][a] * c[0][a][k] + p[0][a] * c[1][a][k]).sum::<f64>();
+        let direct: f64 = (0..WIDTH).map(|k| (before[0][k] + taken(k)) * s[k][1]).sum();
+        assert!((w[0][1] - direct).abs() <= 1e-14, "rounding of products of numbers of about 1");
+        assert_eq!(w, copy);
+        scale(kind, &[], &[], &s, &mut w, &mut [], &mut square);
         seen.extend(w);
+        seen.extend(square);
         seen
     }
 

@@ -27,8 +27,9 @@ use crate::eigen::block::{
     Block, Row, SMALL_ZERO, Small, WIDTH, ZERO, add, cholesky, largest, negative, product, transpose,
 };
 use crate::eigen::factor::Factor;
-use crate::eigen::kernel::{self, gram_of};
+use crate::eigen::kernel;
 use crate::eigen::loss::{Loss, uniform};
+use crate::eigen::parts::{self, gram_of};
 use crate::eigen::projected::{Projected, Ritz};
 use crate::eigen::seconds::Step;
 use crate::eigen::slice::Tools;
@@ -52,8 +53,13 @@ const ONE_PASS: f64 = 1e-3;
 /// By how much ‖Op‖ may be larger than the Ritz values that a space starts with say.
 const UNKNOWN: f64 = 4.0;
 
-/// Rows that are combined between two questions whether to stop.
-const ROWS_AT_ONCE: usize = 1 << 15;
+/// A block no longer than this share of ‖Op‖ is rounding.
+const RANK: f64 = 1e-13;
+
+/// How ill-conditioned a block may be, and how much longer it may have been before the vectors next to it were taken off,
+/// if the products known by then are to orthonormalise it: rounding is multiplied by the squares of both.
+const CONDITION_MAX: f64 = 50.0;
+const TAKEN_MAX: f64 = 30.0;
 
 /// A Krylov space around one shift, growing by a block a step.
 pub(crate) struct Krylov<'a> {
@@ -68,10 +74,14 @@ pub(crate) struct Krylov<'a> {
     projected: Projected,
     /// What the first solve is to be combined with, if there is an X.
     start: Vec<Start>,
+    /// What X came with, to be given back should the space be of no use.
+    origin: Option<Origin>,
     /// σ₂ − σ₁.
     moved: f64,
     /// R of the last step.
     coupling: Small,
+    /// QᵀQ − I of the last block, as far as it is known: rounding, which a step multiplies by the square of its α / R.
+    rounding: Small,
     loss: Loss,
     every_step: bool,
     /// Blocks of X nearest to the shift.
@@ -79,6 +89,8 @@ pub(crate) struct Krylov<'a> {
     /// The same, where there is no X: Ritz vectors of this space, and how often they have been formed.
     nearest: Vec<Block>,
     nearest_formed: usize,
+    /// A copy of the last block, for the next solve to work in.
+    ahead: Option<Block>,
     random: ChaCha8Rng,
     /// The largest |α| so far: an estimate of ‖Op‖ from below.
     scale: f64,
@@ -94,6 +106,11 @@ struct Start {
 pub(crate) struct Handover {
     x: Vec<Block>,
     q: Block,
+    origin: Origin,
+}
+
+/// The numbers of a hand-over.
+struct Origin {
     theta: Vec<f64>,
     s: Vec<[f64; WIDTH]>,
     shift: f64,
@@ -110,7 +127,7 @@ impl<'a> Krylov<'a> {
         careful: bool,
     ) -> Krylov<'a> {
         let n = tools.matrix.rows();
-        let kept = handover.as_ref().map_or(0, |handover| handover.theta.len());
+        let kept = handover.as_ref().map_or(0, |handover| WIDTH * handover.x.len());
         let mut space = Krylov {
             tools,
             factor,
@@ -120,21 +137,25 @@ impl<'a> Krylov<'a> {
             steps: 0,
             projected: Projected::new(kept),
             start: Vec::new(),
+            origin: None,
             moved: 0.0,
             coupling: SMALL_ZERO,
+            rounding: SMALL_ZERO,
             loss: Loss::default(),
             every_step: careful,
             nearest_kept: 0..0,
             nearest: Vec::new(),
             nearest_formed: 0,
+            ahead: None,
             random: ChaCha8Rng::seed_from_u64(seed),
             scale: 0.0,
         };
-        if let Some(Handover { x, q, theta, s, shift, loss }) = handover {
-            space.moved = factor.shift - shift;
-            space.start = theta
+        if let Some(Handover { x, q, origin }) = handover {
+            space.moved = factor.shift - origin.shift;
+            space.start = origin
+                .theta
                 .iter()
-                .zip(s)
+                .zip(&origin.s)
                 .map(|(theta, s)| {
                     let value = 1.0 / (1.0 / theta - space.moved);
                     Start { value, g: s.map(|s| s / theta * value) }
@@ -146,9 +167,10 @@ impl<'a> Krylov<'a> {
             let first =
                 ((closest + WIDTH / 2) / WIDTH).saturating_sub(NEAREST / 2).min((kept / WIDTH).saturating_sub(NEAREST));
             space.nearest_kept = first..(first + NEAREST).min(kept / WIDTH);
-            space.loss = loss.next(WIDTH * space.nearest_kept.start..WIDTH * space.nearest_kept.end);
+            space.loss = origin.loss.next(WIDTH * space.nearest_kept.start..WIDTH * space.nearest_kept.end);
             space.basis = x;
             space.basis.push(q);
+            space.origin = Some(origin);
         } else {
             let mut start = tools.pool.take(n + 1);
             start[..n].iter_mut().for_each(|row| *row = std::array::from_fn(|_| uniform(&mut space.random)));
@@ -182,8 +204,11 @@ impl<'a> Krylov<'a> {
     pub(crate) fn step(&mut self) -> Result<(), EigenError> {
         let (n, kind, last) = (self.n, self.tools.kind, self.basis.len() - 1);
         let clock = &self.tools.progress.clock;
-        let mut w = self.tools.pool.take(n + 1);
-        w.copy_from_slice(&self.basis[last]);
+        let mut w = self.ahead.take().unwrap_or_else(|| {
+            let mut w = self.tools.pool.take(n + 1);
+            w.copy_from_slice(&self.basis[last]);
+            w
+        });
         clock.time(Step::Solve, || kernel::solve(kind, &self.factor.packed, &mut w));
         let repaired = clock.time(Step::Orthogonalise, || self.recur(w));
         if repaired { self.form_nearest() } else { Ok(()) }
@@ -196,39 +221,44 @@ impl<'a> Krylov<'a> {
         let coupled = self.kept > 0 && self.steps < 2;
         let (mut alpha, mut square);
         let mut along = Vec::new();
+        // What is still to be taken off W, along the blocks next to it.
+        let mut minus = Vec::new();
         // Rounding of the projection beside that of an inner product.
         let mut rounding = 1.0;
+        let mut taken = 0.0;
         if coupled {
             along = self.orthogonalise(&mut w);
             square = gram_of(kind, &w[..n], &w[..n]);
-            let taken = largest(&along);
+            let most = largest(&along);
             let left = (0..WIDTH).map(|a| square[a][a].sqrt()).fold(f64::INFINITY, f64::min);
-            rounding = (taken / left).max(1.0);
-            if self.every_step || left.is_nan() || left < ONE_PASS * taken {
+            rounding = (most / left).max(1.0);
+            if self.every_step || left.is_nan() || left < ONE_PASS * most {
                 self.orthogonalise(&mut w).iter().zip(&mut along).for_each(|(again, along)| add(along, again));
                 square = gram_of(kind, &w[..n], &w[..n]);
                 rounding = 1.0;
             }
             alpha = along[last];
         } else {
-            let mut q = vec![&self.basis[last][..n]];
-            if !self.every_step {
-                q.extend(self.basis[self.nearest_kept.clone()].iter().chain(&self.nearest).map(|block| &block[..n]));
-            }
-            let mut c = vec![SMALL_ZERO; q.len()];
-            if self.steps > 0 {
-                let back = negative(&transpose(&self.coupling));
-                kernel::recur(kind, &[&self.basis[last - 1][..n]], &[back], &mut w[..n], &q, &mut c);
-            } else {
-                kernel::gram(kind, &q, &[&w[..n]], &mut c);
-            }
+            let next_to = self.next_to();
+            let mut c = vec![SMALL_ZERO; next_to.len() + 1];
+            let back = negative(&transpose(&self.coupling));
+            let before: &[&[Row]] = if self.steps > 0 { &[&self.basis[last - 1][..n]] } else { &[] };
+            parts::recur(kind, before, &[back], &mut w[..n], &next_to, &mut c);
+            square = c.pop().unwrap_or(SMALL_ZERO);
+            taken = (0..WIDTH).map(|a| square[a][a].sqrt()).fold(0.0, f64::max);
             alpha = c[0];
-            let minus: Vec<Small> = c.iter().map(negative).collect();
-            square = SMALL_ZERO;
-            kernel::recur(kind, &q, &minus, &mut w[..n], &[], std::slice::from_mut(&mut square));
+            add(&mut alpha, &negative(&product(&self.rounding, &c[0]))); // (QᵀQ)⁻¹ QᵀW
+            let before = std::mem::replace(&mut c[0], alpha);
             if self.every_step {
+                parts::take_off(kind, &next_to, &c, &mut [&mut w[..n]]);
                 add(&mut alpha, &self.orthogonalise(&mut w)[last]);
                 square = gram_of(kind, &w[..n], &w[..n]);
+            } else {
+                // What is left has a part of the square, as Pythagoras has it; the nearest are as good as orthonormal,
+                // for there is next to nothing along them.
+                add(&mut square, &negative(&product(&transpose(&before), &alpha)));
+                c[1..].iter().for_each(|c| add(&mut square, &negative(&product(&transpose(c), c))));
+                minus = c.iter().map(negative).collect();
             }
         }
         self.loss.measure(&alpha);
@@ -239,28 +269,68 @@ impl<'a> Krylov<'a> {
                 self.scale = self.scale.max(alpha[a][c].abs());
             }
         }
-        let r = self.orthonormalise(&mut w, square);
+        let known = self.normaliser(&square, taken);
+        let r = match known {
+            Some((r, _)) => r,
+            None => {
+                if !minus.is_empty() {
+                    let plus: Vec<Small> = minus.drain(..).map(|c| negative(&c)).collect();
+                    parts::take_off(kind, &self.next_to(), &plus, &mut [&mut w[..n]]);
+                    square = gram_of(kind, &w[..n], &w[..n]);
+                }
+                self.orthonormalise(&mut w, square)
+            }
+        };
         self.project(&along, &alpha, &r);
 
         // An eigenvalue much closer to the shift than any known: what is lost along its vector cannot be foreseen.
-        let known = self.start.iter().fold(0.0f64, |most, start| most.max(start.value.abs()));
-        self.every_step |= coupled && self.scale > UNKNOWN * known;
+        let value = self.start.iter().fold(0.0f64, |most, start| most.max(start.value.abs()));
+        self.every_step |= coupled && self.scale > UNKNOWN * value;
 
         let before = std::mem::replace(&mut self.coupling, r);
         let columns = WIDTH * self.basis.len();
-        let mut repaired = false;
+        let mut due = false;
         if coupled || self.every_step {
             self.loss.repaired(columns, rounding, &mut self.random);
-        } else if self.loss.step(&self.projected, &alpha, &before, &r, &mut self.random) > LOSS_MAX {
+        } else {
+            due = self.loss.step(&self.projected, &alpha, &before, &r, &mut self.random) > LOSS_MAX;
+        }
+        if let Some((_, inverse)) = known {
+            let mut ahead = (!due).then(|| self.tools.pool.take(n + 1));
+            let next_to = if minus.is_empty() { Vec::new() } else { self.next_to() };
+            let copy = ahead.as_mut().map(|ahead| &mut ahead[..n]);
+            self.rounding = parts::scale(kind, &next_to, &minus, &inverse, &mut w[..n], copy);
+            (0..WIDTH).for_each(|a| self.rounding[a][a] -= 1.0);
+            self.ahead = ahead;
+        }
+        if due {
             let measured = self.repair(&mut w);
             self.every_step |= measured > LOSS_TRUSTED;
             self.loss.compare(measured);
             self.loss.repaired(columns, 1.0, &mut self.random);
-            repaired = true;
         }
         self.basis.push(w);
         self.steps += 1;
-        repaired
+        due
+    }
+
+    /// The blocks that every step is made orthogonal to, beside the one before the last: the last, and those nearest to
+    /// the shift.
+    fn next_to(&self) -> Vec<&[Row]> {
+        let mut blocks: Vec<&Block> = self.basis.last().into_iter().collect();
+        if !self.every_step {
+            blocks.extend(self.basis[self.nearest_kept.clone()].iter().chain(&self.nearest));
+        }
+        blocks.into_iter().map(|block| &block[..self.n]).collect()
+    }
+
+    /// R and R⁻¹ for a block W with Wᵀ W = `square`, of which columns up to `taken` long were the rest, unless that is too
+    /// little to orthonormalise it.
+    fn normaliser(&self, square: &Small, taken: f64) -> Option<(Small, Small)> {
+        let (r, inverse) = cholesky(square)?;
+        let (least, most) = ends(&r);
+        let good = most > RANK * self.scale && most < CONDITION_MAX * least && taken < TAKEN_MAX * least;
+        good.then_some((r, inverse))
     }
 
     /// Forms the Ritz vectors nearest to the shift, if there is no X to take them from and they are worth it by now.
@@ -317,26 +387,22 @@ impl<'a> Krylov<'a> {
     fn orthogonalise(&self, w: &mut [Row]) -> Vec<Small> {
         let blocks: Vec<&[Row]> = self.basis.iter().map(|block| &block[..self.n]).collect();
         let mut c = vec![SMALL_ZERO; blocks.len()];
-        kernel::gram(self.tools.kind, &blocks, &[&w[..self.n]], &mut c);
-        let minus: Vec<Small> = c.iter().map(negative).collect();
-        kernel::update(self.tools.kind, &blocks, &minus, &mut [&mut w[..self.n]], true);
+        parts::gram(self.tools.kind, &blocks, &[&w[..self.n]], &mut c);
+        parts::take_off(self.tools.kind, &blocks, &c, &mut [&mut w[..self.n]]);
         c
     }
 
     /// Makes the last block and the new one orthogonal to all before them: both, because the recurrence goes on from
-    /// both, and together, because the basis is then read once. Result: the largest inner product there was.
+    /// both, and together, because the basis is then read once. What they have in common after that is of the square of
+    /// what was taken off. Result: the largest inner product there was.
     fn repair(&mut self, w: &mut [Row]) -> f64 {
         let (n, kind) = (self.n, self.tools.kind);
         let Some((last, earlier)) = self.basis.split_last_mut() else { return 0.0 };
         let blocks: Vec<&[Row]> = earlier.iter().map(|block| &block[..n]).collect();
         let mut c = vec![SMALL_ZERO; 2 * blocks.len()];
-        kernel::gram(kind, &blocks, &[&last[..n], &w[..n]], &mut c);
-        let measured = largest(&c);
-        let minus: Vec<Small> = c.iter().map(negative).collect();
-        kernel::update(kind, &blocks, &minus, &mut [&mut last[..n], &mut w[..n]], true);
-        let between = negative(&gram_of(kind, &last[..n], &w[..n]));
-        kernel::update(kind, &[&last[..n]], &[between], &mut [&mut w[..n]], true);
-        measured
+        parts::gram(kind, &blocks, &[&last[..n], &w[..n]], &mut c);
+        parts::take_off(kind, &blocks, &c, &mut [&mut last[..n], &mut w[..n]]);
+        largest(&c)
     }
 
     /// W = Q R with R upper triangular; W becomes Q. `square` is Wᵀ W. Cholesky of it, again while R is ill-conditioned
@@ -344,18 +410,18 @@ impl<'a> Krylov<'a> {
     fn orthonormalise(&mut self, w: &mut Block, mut square: Small) -> Small {
         let n = self.n;
         let mut total: Option<Small> = None;
+        self.rounding = SMALL_ZERO;
         for _ in 0..4 {
             let Some((r, inverse)) = cholesky(&square) else {
                 break;
             };
-            let (least, most) =
-                (0..WIDTH).fold((f64::INFINITY, 0.0f64), |(least, most), i| (least.min(r[i][i]), most.max(r[i][i])));
-            if most <= 1e-13 * self.scale {
+            let (least, most) = ends(&r);
+            if most <= RANK * self.scale {
                 break; // an invariant subspace: what is left of W is rounding
             }
-            kernel::scale(self.tools.kind, &inverse, &mut w[..n]);
+            parts::scale(self.tools.kind, &[], &[], &inverse, &mut w[..n], None);
             total = Some(total.map_or(r, |total| product(&r, &total)));
-            if most / least < 50.0 {
+            if most / least < CONDITION_MAX {
                 return total.unwrap_or(r);
             }
             // Scaling up by 1/R amplified what was left along the basis.
@@ -426,52 +492,69 @@ impl<'a> Krylov<'a> {
         inverse_step: bool,
         into: &mut [&mut [Row]],
     ) -> Result<(), EigenError> {
-        let m = self.dimension();
-        let used = m / WIDTH + usize::from(inverse_step);
-        let mut c = vec![SMALL_ZERO; used * into.len()];
-        for (place, &column) in chosen.iter().enumerate() {
-            let (c, to) = (&mut c[place / WIDTH * used..][..used], place % WIDTH);
-            for from in 0..m {
-                c[from / WIDTH][from % WIDTH][to] = ritz.vectors[(from, column)];
-            }
-            if inverse_step {
+        let used = self.dimension() / WIDTH + usize::from(inverse_step);
+        let mut c = coefficients(ritz, chosen, used);
+        if inverse_step {
+            for (place, &column) in chosen.iter().enumerate() {
                 for (a, x) in ritz.couplings[column].iter().enumerate() {
-                    c[used - 1][a][to] = x / ritz.values[column];
+                    c[place / WIDTH * used + used - 1][a][place % WIDTH] = x / ritz.values[column];
                 }
             }
         }
-        self.tools.progress.clock.time(Step::Vectors, || {
-            for first in (0..self.n).step_by(ROWS_AT_ONCE) {
-                self.tools.progress.go_on()?;
-                let rows = first..(first + ROWS_AT_ONCE).min(self.n);
-                let blocks: Vec<&[Row]> = self.basis[..used].iter().map(|block| &block[rows.clone()]).collect();
-                let mut into: Vec<&mut [Row]> = into.iter_mut().map(|block| &mut block[rows.clone()]).collect();
-                kernel::update(self.tools.kind, &blocks, &c, &mut into, false);
-            }
-            Ok(())
-        })
+        let blocks: Vec<&[Row]> = self.basis[..used].iter().map(|block| &block[..self.n]).collect();
+        let Tools { kind, progress, .. } = self.tools;
+        progress.clock.time(Step::Vectors, || parts::combine(kind, &blocks, &c, into, progress))
     }
 
     /// Ends the space and leaves the chosen Ritz vectors, a multiple of eight, to the next one.
     pub(crate) fn hand_over(mut self, ritz: &Ritz, chosen: &[usize]) -> Result<Handover, EigenError> {
-        let mut x: Vec<Block> = chosen.chunks(WIDTH).map(|_| self.tools.pool.take(self.n + 1)).collect();
-        let mut into: Vec<&mut [Row]> = x.iter_mut().map(|x| &mut x[..self.n]).collect();
-        self.combine(ritz, chosen, false, &mut into)?;
+        let Tools { kind, progress, pool, .. } = self.tools;
         let q = self.basis.pop().unwrap_or_else(|| unreachable!("a basis has a block"));
+        let c = coefficients(ritz, chosen, self.basis.len());
+        let mut blocks: Vec<&mut [Row]> = self.basis.iter_mut().map(|block| &mut block[..self.n]).collect();
+        progress.clock.time(Step::Vectors, || parts::combine_in_place(kind, &mut blocks, &c, progress))?;
+        pool.give(self.basis.drain(chosen.len() / WIDTH..));
         Ok(Handover {
-            x,
+            x: std::mem::take(&mut self.basis),
             q,
-            theta: chosen.iter().map(|&k| ritz.values[k]).collect(),
-            s: chosen.iter().map(|&k| ritz.couplings[k]).collect(),
-            shift: self.factor.shift,
-            loss: std::mem::take(&mut self.loss),
+            origin: Origin {
+                theta: chosen.iter().map(|&k| ritz.values[k]).collect(),
+                s: chosen.iter().map(|&k| ritz.couplings[k]).collect(),
+                shift: self.factor.shift,
+                loss: std::mem::take(&mut self.loss),
+            },
         })
     }
+
+    /// What the space started with, for another try: no step has changed it.
+    pub(crate) fn give_back(mut self) -> Option<Handover> {
+        let origin = self.origin.take()?;
+        let mut x: Vec<Block> = self.basis.drain(..=self.kept / WIDTH).collect();
+        let q = x.pop()?;
+        Some(Handover { x, q, origin })
+    }
+}
+
+/// The coefficients of Ritz vectors along so many blocks of a basis, a block's after another's.
+fn coefficients(ritz: &Ritz, chosen: &[usize], blocks: usize) -> Vec<Small> {
+    let mut c = vec![SMALL_ZERO; blocks * chosen.len().div_ceil(WIDTH)];
+    for (place, &column) in chosen.iter().enumerate() {
+        let (c, to) = (&mut c[place / WIDTH * blocks..][..blocks], place % WIDTH);
+        for (from, value) in ritz.vectors.col(column).iter().enumerate() {
+            c[from / WIDTH][from % WIDTH][to] = *value;
+        }
+    }
+    c
+}
+
+/// The least and the largest diagonal entry.
+fn ends(r: &Small) -> (f64, f64) {
+    (0..WIDTH).fold((f64::INFINITY, 0.0f64), |(least, most), i| (least.min(r[i][i]), most.max(r[i][i])))
 }
 
 impl Drop for Krylov<'_> {
     fn drop(&mut self) {
-        self.tools.pool.give(self.basis.drain(..).chain(self.nearest.drain(..)));
+        self.tools.pool.give(self.basis.drain(..).chain(self.nearest.drain(..)).chain(self.ahead.take()));
     }
 }
 

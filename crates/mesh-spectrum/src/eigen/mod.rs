@@ -24,6 +24,7 @@ mod memory;
 mod order;
 mod output;
 mod pages;
+mod parts;
 mod polish;
 mod projected;
 mod seconds;

@@ -4,6 +4,8 @@
 
 use std::sync::OnceLock;
 
+use rayon::prelude::*;
+
 use crate::eigen::block::{Block, Pool, Row, WIDTH, ZERO};
 use crate::eigen::factor::Factor;
 use crate::eigen::kernel::{self, Kind};
@@ -81,15 +83,37 @@ impl From<EigenError> for Trouble {
     }
 }
 
-/// Finds the pairs around the factor's shift.
+/// Finds the pairs around the factor's shift. What was handed over is used up, unless the slice goes wrong.
 pub(crate) fn slice<'a>(
     tools: &Tools<'a>,
     factor: &'a Factor,
     demand: Demand,
-    handover: Option<Handover>,
+    handover: &mut Option<Handover>,
 ) -> Result<Slice<'a>, Trouble> {
-    let Demand { left, right, last, seed, careful, dimension: foreseen } = demand;
-    let mut space = Krylov::new(*tools, factor, seed, handover, careful);
+    let mut space = Krylov::new(*tools, factor, demand.seed, handover.take(), demand.careful);
+    match grow(tools, factor, demand, &mut space) {
+        Ok(Chosen { ritz, chosen, beyond, dimension }) => {
+            let eigenvalues = chosen.iter().map(|&k| factor.shift + 1.0 / ritz.values[k]).collect();
+            Ok(Slice { factor, space, ritz, chosen, beyond, eigenvalues, dimension })
+        }
+        Err(trouble) => {
+            *handover = space.give_back();
+            Err(trouble)
+        }
+    }
+}
+
+/// What a space has come to: as in [`Slice`].
+struct Chosen {
+    ritz: Ritz,
+    chosen: Vec<usize>,
+    beyond: Vec<usize>,
+    dimension: usize,
+}
+
+/// Grows the space until the pairs demanded are in it.
+fn grow(tools: &Tools, factor: &Factor, demand: Demand, space: &mut Krylov) -> Result<Chosen, Trouble> {
+    let Demand { left, right, last, careful, dimension: foreseen, seed: _ } = demand;
     // Measured on sheet meshes. A space a little too large costs a step, one too small another projected problem.
     let mut next = foreseen.unwrap_or(90 + 2 * (left + right) + left.abs_diff(right));
     let (mut rate, mut before) = (RATE, None);
@@ -122,11 +146,10 @@ pub(crate) fn slice<'a>(
         if let Some(cut) = cut {
             let mut chosen: Vec<usize> = below[..left].iter().rev().copied().collect();
             chosen.extend(&above[..cut]);
-            let eigenvalues = chosen.iter().map(eigenvalue).collect();
             // Steps that could have been saved.
             let surplus = (-excess.ln() / rate.ln()).clamp(0.0, STEPS as f64) as usize;
             let (dimension, beyond) = (dimension - WIDTH * surplus, all_above[cut..].to_vec());
-            return Ok(Slice { factor, space, ritz, chosen, beyond, eigenvalues, dimension });
+            return Ok(Chosen { ritz, chosen, beyond, dimension });
         }
         if !space.can_grow() || dimension > 400 + 20 * (left + right) {
             let (below, above, shift) = (below.len(), above.len(), factor.shift);
@@ -185,14 +208,20 @@ impl Slice<'_> {
         self.space.vectors(&self.ritz, &self.chosen, into)?;
         tools.progress.clock.time(Step::Vectors, || {
             let n = tools.matrix.rows();
-            let mut scratch = [tools.pool.take(n + 1), tools.pool.take(n + 1)];
-            let blocks = into.iter_mut().zip(self.eigenvalues.chunks(WIDTH));
-            let residuals =
-                blocks.map(|(block, eigenvalues)| settle(tools, self.factor, block, eigenvalues, &mut scratch));
-            let residuals = residuals.collect::<Result<Vec<_>, Trouble>>();
-            tools.pool.give(scratch);
-            Ok(residuals?.concat())
+            let blocks = into.par_iter_mut().zip(self.eigenvalues.par_chunks(WIDTH));
+            let residuals = blocks.map(|(block, eigenvalues)| {
+                let mut scratch = [tools.pool.take(n + 1), tools.pool.take(n + 1)];
+                let residuals = settle(tools, self.factor, block, eigenvalues, &mut scratch);
+                tools.pool.give(scratch);
+                residuals
+            });
+            Ok(residuals.collect::<Result<Vec<_>, Trouble>>()?.concat())
         })
+    }
+
+    /// What the slice started with, for another try.
+    pub(crate) fn give_back(self) -> Option<Handover> {
+        self.space.give_back()
     }
 
     /// Leaves the `count` vectors above the slice (a multiple of eight, or as many as there are) to the next one.

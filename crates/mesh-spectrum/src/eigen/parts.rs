@@ -1,0 +1,169 @@
+//! Products of blocks on parts of their rows, which a thread with nothing else to do may take.
+//!
+//! A chain of slices is one thread's work. When another has ended, or there is but one, its products are what can be
+//! shared. The parts depend on the number of rows alone and sums are added in their order, so that the result is the
+//! same bytes on any number of threads.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use crate::eigen::block::{Row, SMALL_ZERO, Small, WIDTH, add, negative};
+use crate::eigen::kernel::{self, Kind};
+use crate::eigen::{EigenError, Progress};
+
+/// The most parts, and the fewest rows of one: the work on them takes longer than to wake a thread.
+const PARTS_MAX: usize = 4;
+const ROWS_MIN: usize = 4096;
+
+/// Rows of a panel that stays in a core's cache: parts are whole panels.
+const PANEL: usize = 256;
+
+/// Rows that are combined between two questions whether to stop.
+const ROWS_AT_ONCE: usize = 1 << 15;
+
+/// Rows of a part.
+fn part(rows: usize) -> usize {
+    rows.div_ceil((rows / ROWS_MIN).clamp(1, PARTS_MAX)).next_multiple_of(PANEL)
+}
+
+fn parts(rows: usize) -> impl IndexedParallelIterator<Item = Range<usize>> {
+    let part = part(rows);
+    (0..rows.div_ceil(part)).into_par_iter().map(move |k| k * part..((k + 1) * part).min(rows))
+}
+
+fn of<'a>(blocks: &[&'a [Row]], rows: &Range<usize>) -> Vec<&'a [Row]> {
+    blocks.iter().map(|block| &block[rows.clone()]).collect()
+}
+
+/// The parts of several blocks, for each part those of all blocks.
+fn split<'a>(blocks: &'a mut [&mut [Row]]) -> Vec<Vec<&'a mut [Row]>> {
+    let rows = blocks.first().map_or(0, |block| block.len());
+    let mut all: Vec<Vec<&mut [Row]>> = (0..rows.div_ceil(part(rows))).map(|_| Vec::new()).collect();
+    for block in blocks {
+        block.chunks_mut(part(rows)).zip(&mut all).for_each(|(rows, of_part)| of_part.push(rows));
+    }
+    all
+}
+
+fn sum(parts: Vec<Vec<Small>>, out: &mut [Small]) {
+    out.fill(SMALL_ZERO);
+    parts.iter().for_each(|part| out.iter_mut().zip(part).for_each(|(sum, part)| add(sum, part)));
+}
+
+/// out[i·blocks + k] = Q_kᵀ W_i.
+pub(crate) fn gram(kind: Kind, blocks: &[&[Row]], ws: &[&[Row]], out: &mut [Small]) {
+    let rows = blocks.first().map_or(0, |block| block.len());
+    let one = |rows: Range<usize>| {
+        let mut out = vec![SMALL_ZERO; blocks.len() * ws.len()];
+        kernel::gram(kind, &of(blocks, &rows), &of(ws, &rows), &mut out);
+        out
+    };
+    sum(parts(rows).map(one).collect(), out);
+}
+
+/// Qᵀ W of two blocks.
+pub(crate) fn gram_of(kind: Kind, q: &[Row], w: &[Row]) -> Small {
+    let mut out = [SMALL_ZERO];
+    gram(kind, &[q], &[w], &mut out);
+    out[0]
+}
+
+/// W_i −= Σ_k Q_k C_ki with C_ki = c[i·blocks + k], the layout of [`gram`].
+pub(crate) fn take_off(kind: Kind, blocks: &[&[Row]], c: &[Small], ws: &mut [&mut [Row]]) {
+    let minus: Vec<Small> = c.iter().map(negative).collect();
+    let part = part(ws.first().map_or(0, |w| w.len()));
+    split(ws).par_iter_mut().enumerate().for_each(|(number, ws)| {
+        let rows = number * part..number * part + ws[0].len();
+        kernel::update(kind, &of(blocks, &rows), &minus, ws, true);
+    });
+}
+
+/// W += Σ_k Q_k C_k, then out_i = P_iᵀ W and, after them, Wᵀ W, in one pass.
+pub(crate) fn recur(kind: Kind, q: &[&[Row]], c: &[Small], w: &mut [Row], p: &[&[Row]], out: &mut [Small]) {
+    let part = part(w.len());
+    let one = |(number, w): (usize, &mut [Row])| {
+        let rows = number * part..number * part + w.len();
+        let mut out = vec![SMALL_ZERO; p.len() + 1];
+        kernel::recur(kind, &of(q, &rows), c, w, &of(p, &rows), &mut out);
+        out
+    };
+    sum(w.par_chunks_mut(part).enumerate().map(one).collect(), out);
+}
+
+/// W = (W + Σ_k Q_k C_k) S, and a copy of it, if one is wanted, in one pass. Result: Wᵀ W.
+pub(crate) fn scale(
+    kind: Kind,
+    q: &[&[Row]],
+    c: &[Small],
+    s: &Small,
+    w: &mut [Row],
+    copy: Option<&mut [Row]>,
+) -> Small {
+    let part = part(w.len());
+    let one = |number: usize, w: &mut [Row], copy: &mut [Row]| {
+        let rows = number * part..number * part + w.len();
+        let mut square = SMALL_ZERO;
+        kernel::scale(kind, &of(q, &rows), c, s, w, copy, &mut square);
+        vec![square]
+    };
+    let ws = w.par_chunks_mut(part).enumerate();
+    let mut out = [SMALL_ZERO];
+    let squares = match copy {
+        Some(copy) => ws.zip(copy.par_chunks_mut(part)).map(|((number, w), copy)| one(number, w, copy)).collect(),
+        None => ws.map(|(number, w)| one(number, w, &mut [])).collect(),
+    };
+    sum(squares, &mut out);
+    out[0]
+}
+
+/// W_i = Σ_k Q_k C_ki.
+///
+/// # Errors
+/// [`EigenError::Stopped`].
+pub(crate) fn combine(
+    kind: Kind,
+    blocks: &[&[Row]],
+    c: &[Small],
+    into: &mut [&mut [Row]],
+    progress: &Progress,
+) -> Result<(), EigenError> {
+    let part = part(into.first().map_or(0, |w| w.len()));
+    split(into).par_iter_mut().enumerate().try_for_each(|(number, ws)| {
+        let end = ws[0].len();
+        for first in (0..end).step_by(ROWS_AT_ONCE) {
+            progress.go_on()?;
+            let rows = first..(first + ROWS_AT_ONCE).min(end);
+            let blocks = of(blocks, &(number * part + rows.start..number * part + rows.end));
+            let mut ws: Vec<&mut [Row]> = ws.iter_mut().map(|w| &mut w[rows.clone()]).collect();
+            kernel::update(kind, &blocks, c, &mut ws, false);
+        }
+        Ok(())
+    })
+}
+
+/// The same in the memory of the first blocks, as many as are made.
+///
+/// # Errors
+/// [`EigenError::Stopped`].
+pub(crate) fn combine_in_place(
+    kind: Kind,
+    blocks: &mut [&mut [Row]],
+    c: &[Small],
+    progress: &Progress,
+) -> Result<(), EigenError> {
+    let made = c.len() / blocks.len();
+    split(blocks).par_iter_mut().try_for_each(|blocks| {
+        let mut made = vec![vec![[0.0; WIDTH]; PANEL]; made];
+        let end = blocks[0].len();
+        for first in (0..end).step_by(PANEL) {
+            progress.go_on()?;
+            let rows = first..(first + PANEL).min(end);
+            let mut into: Vec<&mut [Row]> = made.iter_mut().map(|made| &mut made[..rows.len()]).collect();
+            let from: Vec<&[Row]> = blocks.iter().map(|block| &block[rows.clone()]).collect();
+            kernel::update(kind, &from, c, &mut into, false);
+            blocks.iter_mut().zip(into).for_each(|(block, made)| block[rows.clone()].copy_from_slice(made));
+        }
+        Ok(())
+    })
+}
