@@ -100,7 +100,7 @@ pub(crate) fn prefetch(rows: &[Row], row: usize) {
 }
 
 /// Rows that are walked together, so that a panel of each block in use stays in the caches (16 KiB each).
-const PANEL: usize = 256;
+pub(crate) const PANEL: usize = 256;
 
 /// How far ahead of its use a block's row is asked for.
 const AHEAD: usize = 64;
@@ -132,14 +132,13 @@ pub(crate) fn outer<A: Arithmetic, const HIGH: usize, const P: usize>(q: &[Row],
     out
 }
 
-/// out[i·blocks + k] = Q_kᵀ W_i; the first block decides how many rows there are.
+/// out[i·blocks + k] += Q_kᵀ W_i; the first block decides how many rows there are.
 #[inline(always)]
 fn gram_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>(
     blocks: &[&[Row]],
     ws: &[&[Row]],
     out: &mut [Small],
 ) {
-    out.fill(SMALL_ZERO);
     let rows = blocks.first().map_or(0, |block| block.len());
     for first in (0..rows).step_by(PANEL) {
         let panel = first..(first + PANEL).min(rows);
@@ -238,7 +237,6 @@ fn recur_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>(
     out: &mut [Small],
 ) {
     out.fill(SMALL_ZERO);
-    let mut part = vec![SMALL_ZERO; out.len()];
     let mut q_panels = Vec::with_capacity(q.len());
     for (number, w) in w.chunks_mut(PANEL).enumerate() {
         let panel = PANEL * number..PANEL * number + w.len();
@@ -251,8 +249,7 @@ fn recur_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>(
         ws.extend(p.iter().map(|p| &p[panel.clone()]));
         ws.push(&*w);
         // Wᵀ P_i two at a time, and turned at the end: W stays in the first cache.
-        gram_with::<A, R, HIGH, P>(&[&*w], &ws, &mut part);
-        out.iter_mut().zip(&part).for_each(|(out, part)| add(out, part));
+        gram_with::<A, R, HIGH, P>(&[&*w], &ws, out);
     }
     out.iter_mut().for_each(|out| *out = transpose(out));
 }
@@ -372,7 +369,7 @@ macro_rules! dispatched {
 }
 
 dispatched! {
-    /// out[i·blocks + k] = Q_kᵀ W_i; the first block decides how many rows there are.
+    /// out[i·blocks + k] += Q_kᵀ W_i; the first block decides how many rows there are.
     gram = gram_with(blocks: &[&[Row]], ws: &[&[Row]], out: &mut [Small]);
     /// W_i (+)= Σ_k Q_k C_ki with C_ki = c[i·blocks + k], the layout of `gram`.
     update = update_with(blocks: &[&[Row]], c: &[Small], ws: &mut [&mut [Row]], add: bool);
@@ -441,7 +438,10 @@ pub(crate) mod tests {
         let mut square = SMALL_ZERO;
         scale(kind, &blocks, &c, &s, &mut w, &mut copy, &mut square);
         let direct: f64 = w.iter().map(|w| w[2] * w[4]).sum();
-        assert!((square[2][4] - direct).abs() <= 1e-15 * rows as f64 * (1.0 + direct.abs()), "the same in another order");
+        assert!(
+            (square[2][4] - direct).abs() <= 1e-15 * rows as f64 * (1.0 + direct.abs()),
+            "the same in another order"
+        );
         let taken = |k: usize| (0..WIDTH).map(|a| q[0][a] * c[0][a][k] + p[0][a] * c[1][a][k]).sum::<f64>();
         let direct: f64 = (0..WIDTH).map(|k| (before[0][k] + taken(k)) * s[k][1]).sum();
         assert!((w[0][1] - direct).abs() <= 1e-14, "rounding of products of numbers of about 1");

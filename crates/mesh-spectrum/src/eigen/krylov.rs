@@ -561,3 +561,68 @@ impl Drop for Krylov<'_> {
 fn norm_of(block: &[Row], column: usize) -> f64 {
     block.iter().map(|row| row[column] * row[column]).sum::<f64>().sqrt()
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::OnceLock;
+
+    use super::*;
+    use crate::eigen::Progress;
+    use crate::eigen::block::Pool;
+    use crate::eigen::factor::Symbolic;
+    use crate::eigen::kernel::Kind;
+    use crate::operator::Csr;
+
+    /// A path of `n` vertices: eigenvalues 2 − 2 cos(π (k + ½) / n), nearly.
+    fn path(n: u32) -> Csr {
+        let entries = (0..n).flat_map(|i| {
+            let neighbours = [i.checked_sub(1), Some(i + 1).filter(|j| *j < n)];
+            let off = neighbours.into_iter().flatten().map(move |j| (i, j, -1.0));
+            off.chain([(i, i, 2.0 + 1e-3 * f64::from(i % 7))])
+        });
+        Csr::from_entries(n as usize, entries.collect())
+    }
+
+    #[test]
+    fn a_space_is_orthonormal_and_gives_back_what_it_started_with() {
+        let matrix = path(1500);
+        let (symbolic, pool, levels) =
+            (Symbolic::new(&matrix, Kind::best()).unwrap(), Pool::default(), OnceLock::new());
+        let progress = Progress::new(&(), 0);
+        let factor = |shift: f64| symbolic.factor(&matrix, shift, &progress).unwrap();
+        let (first, second) = (factor(0.1003), factor(0.1213));
+        let tools = Tools {
+            matrix: &matrix,
+            levels: &levels,
+            pool: &pool,
+            kind: Kind::best(),
+            progress: &progress,
+            top: 0.2,
+            tolerance: 1e-10,
+            norm: 4.0,
+        };
+        let mut space = Krylov::new(tools, &first, 1, None, false);
+        (0..14).for_each(|_| space.step().unwrap());
+        let ritz = space.ritz().unwrap();
+        let mut chosen: Vec<usize> = (0..ritz.values.len()).filter(|&k| ritz.values[k] > 0.0).collect();
+        chosen.sort_by(|&a, &b| ritz.values[b].total_cmp(&ritz.values[a]));
+        let handover = space.hand_over(&ritz, &chosen[..32]).unwrap();
+        let before: Vec<Vec<Row>> =
+            handover.x.iter().chain([&handover.q]).map(|block| block[..1500].to_vec()).collect();
+        let theta = handover.origin.theta.clone();
+
+        let mut space = Krylov::new(tools, &second, 2, Some(handover), false);
+        (0..8).for_each(|_| space.step().unwrap());
+        for (i, q) in space.basis.iter().enumerate() {
+            for (j, p) in space.basis[..=i].iter().enumerate() {
+                let mut product = gram_of(tools.kind, &q[..1500], &p[..1500]);
+                (0..WIDTH).for_each(|a| product[a][a] -= f64::from(i == j));
+                assert!(largest(&[product]) < 1e-8, "blocks {i} and {j}: what repairs keep the loss below, tenfold");
+            }
+        }
+        let back = space.give_back().unwrap();
+        let after: Vec<Vec<Row>> = back.x.iter().chain([&back.q]).map(|block| block[..1500].to_vec()).collect();
+        assert_eq!(before, after);
+        assert_eq!(theta, back.origin.theta);
+    }
+}

@@ -1,8 +1,8 @@
 //! Large pages for memory that is gone through again and again.
 //!
-//! A processor keeps the addresses of some thousand pages at hand. Blocks and factors of large meshes take more pages of
-//! 4 KiB than that, and a solve jumps about in them; with pages of 2 MiB solves take three quarters of the time
-//! (100,000 vertices).
+//! A processor keeps the addresses of some thousand pages at hand. Factors of large meshes take more pages of 4 KiB than
+//! that. (Blocks do not gain by large pages: they are gone through from one end to the other, and in virtual machines
+//! memory in large pages is often dear to touch for the first time.)
 
 /// Bytes of a large page.
 const PAGE: usize = 2 << 20;

@@ -8,16 +8,13 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::eigen::block::{Row, SMALL_ZERO, Small, WIDTH, add, negative};
-use crate::eigen::kernel::{self, Kind};
+use crate::eigen::block::{Row, SMALL_ZERO, Small, ZERO, add, negative};
+use crate::eigen::kernel::{self, Kind, PANEL};
 use crate::eigen::{EigenError, Progress};
 
 /// The most parts, and the fewest rows of one: the work on them takes longer than to wake a thread.
-const PARTS_MAX: usize = 4;
+const PARTS_MAX: usize = 8;
 const ROWS_MIN: usize = 4096;
-
-/// Rows of a panel that stays in a core's cache: parts are whole panels.
-const PANEL: usize = 256;
 
 /// Rows that are combined between two questions whether to stop.
 const ROWS_AT_ONCE: usize = 1 << 15;
@@ -27,7 +24,8 @@ fn part(rows: usize) -> usize {
     rows.div_ceil((rows / ROWS_MIN).clamp(1, PARTS_MAX)).next_multiple_of(PANEL)
 }
 
-fn parts(rows: usize) -> impl IndexedParallelIterator<Item = Range<usize>> {
+/// The parts of so many rows, whole panels.
+pub(crate) fn parts(rows: usize) -> impl IndexedParallelIterator<Item = Range<usize>> {
     let part = part(rows);
     (0..rows.div_ceil(part)).into_par_iter().map(move |k| k * part..((k + 1) * part).min(rows))
 }
@@ -154,7 +152,7 @@ pub(crate) fn combine_in_place(
 ) -> Result<(), EigenError> {
     let made = c.len() / blocks.len();
     split(blocks).par_iter_mut().try_for_each(|blocks| {
-        let mut made = vec![vec![[0.0; WIDTH]; PANEL]; made];
+        let mut made = vec![vec![ZERO; PANEL]; made];
         let end = blocks[0].len();
         for first in (0..end).step_by(PANEL) {
             progress.go_on()?;
@@ -166,4 +164,65 @@ pub(crate) fn combine_in_place(
         }
         Ok(())
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::eigen::block::ZERO;
+    use crate::eigen::kernel::tests::block;
+
+    fn smalls(count: usize) -> Vec<Small> {
+        block(8 * count, 9).chunks(8).map(|rows| std::array::from_fn(|a| rows[a])).collect()
+    }
+
+    /// Everything that is computed in parts, on so many threads.
+    fn all(rows: usize, threads: usize) -> Vec<Vec<Row>> {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let (kind, q, p, v) = (Kind::best(), block(rows, 1), block(rows, 2), block(rows, 3));
+            let blocks: [&[Row]; 2] = [&q, &p];
+            let mut c = vec![SMALL_ZERO; 2];
+            gram(kind, &blocks, &[&v], &mut c);
+            let mut seen = vec![c.concat(), gram_of(kind, &q, &p).to_vec()];
+            let mut w = v.clone();
+            take_off(kind, &blocks, &smalls(2), &mut [&mut w]);
+            seen.push(w.clone());
+            let mut out = vec![SMALL_ZERO; 2];
+            recur(kind, &blocks, &smalls(2), &mut w, &[&q], &mut out);
+            let mut copy = vec![ZERO; rows];
+            let square = scale(kind, &blocks, &smalls(2), &smalls(1)[0], &mut w, Some(&mut copy));
+            assert_eq!(w, copy);
+            seen.extend([out.concat(), square.to_vec(), w]);
+            let progress = Progress::new(&(), 0);
+            let mut made = [vec![ZERO; rows], vec![ZERO; rows]];
+            combine(kind, &[&q, &p, &v], &smalls(6), &mut made.each_mut().map(|w| &mut w[..]), &progress).unwrap();
+            let (mut q, mut p, mut v) = (q, p, v);
+            combine_in_place(kind, &mut [&mut q, &mut p, &mut v], &smalls(6), &progress).unwrap();
+            assert_eq!([&q, &p], [&made[0], &made[1]], "in place, from the same values");
+            seen.extend(made);
+            seen
+        })
+    }
+
+    #[test]
+    fn parts_are_the_same_bytes_on_any_number_of_threads() {
+        for rows in [1, 255, 4095, 4096, 10_000, 70_000] {
+            let covered: Vec<Range<usize>> = parts(rows).collect();
+            assert_eq!((covered[0].start, covered.last().unwrap().end), (0, rows));
+            assert!(covered.windows(2).all(|pair| pair[0].end == pair[1].start && pair[0].end % PANEL == 0));
+            assert_eq!(all(rows, 1), all(rows, 2));
+        }
+    }
+
+    #[test]
+    fn parts_add_up_to_the_whole() {
+        let (rows, kind) = (10_000, Kind::best());
+        let (q, w) = (block(rows, 1), block(rows, 2));
+        let mut whole = vec![SMALL_ZERO; 1];
+        kernel::gram(kind, &[&q], &[&w], &mut whole);
+        for (a, b) in whole[0].as_flattened().iter().zip(gram_of(kind, &q, &w).as_flattened()) {
+            assert!((a - b).abs() <= 1e-16 * rows as f64, "rounding of sums of products below ¼");
+        }
+    }
 }
