@@ -21,7 +21,7 @@ const ROWS_AT_ONCE: usize = 1 << 15;
 
 /// Rows of a part.
 fn part(rows: usize) -> usize {
-    rows.div_ceil((rows / ROWS_MIN).clamp(1, PARTS_MAX)).next_multiple_of(PANEL)
+    rows.max(1).div_ceil((rows / ROWS_MIN).clamp(1, PARTS_MAX)).next_multiple_of(PANEL)
 }
 
 /// The parts of so many rows, whole panels.
