@@ -222,7 +222,7 @@ impl<'a> Krylov<'a> {
         let (mut alpha, mut square);
         let mut along = Vec::new();
         // What is still to be taken off W, along the blocks next to it.
-        let mut minus = Vec::new();
+        let mut off = Vec::new();
         // Rounding of the projection beside that of an inner product.
         let mut rounding = 1.0;
         let mut taken = 0.0;
@@ -258,7 +258,7 @@ impl<'a> Krylov<'a> {
                 // for there is next to nothing along them.
                 add(&mut square, &negative(&product(&transpose(&before), &alpha)));
                 c[1..].iter().for_each(|c| add(&mut square, &negative(&product(&transpose(c), c))));
-                minus = c.iter().map(negative).collect();
+                off = c;
             }
         }
         self.loss.measure(&alpha);
@@ -273,9 +273,8 @@ impl<'a> Krylov<'a> {
         let r = match known {
             Some((r, _)) => r,
             None => {
-                if !minus.is_empty() {
-                    let plus: Vec<Small> = minus.drain(..).map(|c| negative(&c)).collect();
-                    parts::take_off(kind, &self.next_to(), &plus, &mut [&mut w[..n]]);
+                if !off.is_empty() {
+                    parts::take_off(kind, &self.next_to(), &off, &mut [&mut w[..n]]);
                     square = gram_of(kind, &w[..n], &w[..n]);
                 }
                 self.orthonormalise(&mut w, square)
@@ -297,9 +296,9 @@ impl<'a> Krylov<'a> {
         }
         if let Some((_, inverse)) = known {
             let mut ahead = (!due).then(|| self.tools.pool.take(n + 1));
-            let next_to = if minus.is_empty() { Vec::new() } else { self.next_to() };
+            let next_to = if off.is_empty() { Vec::new() } else { self.next_to() };
             let copy = ahead.as_mut().map(|ahead| &mut ahead[..n]);
-            self.rounding = parts::scale(kind, &next_to, &minus, &inverse, &mut w[..n], copy);
+            self.rounding = parts::scale(kind, &next_to, &off, &inverse, &mut w[..n], copy);
             (0..WIDTH).for_each(|a| self.rounding[a][a] -= 1.0);
             self.ahead = ahead;
         }

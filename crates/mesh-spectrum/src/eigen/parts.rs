@@ -89,7 +89,7 @@ pub(crate) fn recur(kind: Kind, q: &[&[Row]], c: &[Small], w: &mut [Row], p: &[&
     sum(w.par_chunks_mut(part).enumerate().map(one).collect(), out);
 }
 
-/// W = (W + Σ_k Q_k C_k) S, and a copy of it, if one is wanted, in one pass. Result: Wᵀ W.
+/// W = (W − Σ_k Q_k C_k) S, and a copy of it, if one is wanted, in one pass. Result: Wᵀ W.
 pub(crate) fn scale(
     kind: Kind,
     q: &[&[Row]],
@@ -98,11 +98,12 @@ pub(crate) fn scale(
     w: &mut [Row],
     copy: Option<&mut [Row]>,
 ) -> Small {
+    let minus: Vec<Small> = c.iter().map(negative).collect();
     let part = part(w.len());
     let one = |number: usize, w: &mut [Row], copy: &mut [Row]| {
         let rows = number * part..number * part + w.len();
         let mut square = SMALL_ZERO;
-        kernel::scale(kind, &of(q, &rows), c, s, w, copy, &mut square);
+        kernel::scale(kind, &of(q, &rows), &minus, s, w, copy, &mut square);
         vec![square]
     };
     let ws = w.par_chunks_mut(part).enumerate();
