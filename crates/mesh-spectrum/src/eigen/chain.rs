@@ -8,7 +8,7 @@ use crate::eigen::block::{Row, WIDTH};
 use crate::eigen::component::mix;
 use crate::eigen::factor::{Factor, Symbolic};
 use crate::eigen::krylov::Handover;
-use crate::eigen::slice::{CUT_GAP, Demand, Tools, Trouble, slice};
+use crate::eigen::slice::{CUT_GAP, Demand, Failure, Tools, Trouble, slice};
 use crate::eigen::weyl::Weyl;
 
 /// Pairs of a slice. Fewer: more factorisations, which cost more beside a solve the larger the mesh; more: a longer way
@@ -16,8 +16,8 @@ use crate::eigen::weyl::Weyl;
 fn pairs_a_slice(rows: usize) -> usize {
     match rows {
         ..30_000 => 32,
-        30_000..300_000 => 36,
-        _ => 44,
+        30_000..300_000 => 40,
+        _ => 48,
     }
 }
 
@@ -99,7 +99,7 @@ pub(crate) fn chain(
     let mut handover: Option<Handover> = None;
     let mut dimension: Option<usize> = None;
     // How often the slice has gone wrong, beyond the attempts before.
-    let mut again = 0;
+    let (mut again, mut moved) = (0, 0);
     let (mut below, mut low) = (first, low);
     for number in 0..slices_max(rows, end - first) {
         let left_over = end - below;
@@ -112,7 +112,7 @@ pub(crate) fn chain(
             (low + place).min(0.5 * (low + high))
         });
         let seed = mix(seed, number as u64);
-        let factor = place_shift(tools, symbolic, wanted, (below, under), (low, high), attempt + again)?;
+        let factor = place_shift(tools, symbolic, wanted, (below, under), (low, high), attempt + again + moved)?;
         let nu = factor.below;
         found.counts.push((factor.shift, nu));
         let left = nu.min(end) - below;
@@ -125,8 +125,17 @@ pub(crate) fn chain(
             // If pairs were missing: the copies of an eigenvalue beyond a block's width come late, out of rounding.
             _ => Some(64 * attempt + 100 + 3 * (nu - below + right)),
         };
-        let demand = Demand { left: nu - below, right, last, seed, careful, dimension: foreseen };
-        let done = slice(tools, &factor, demand, &mut handover).and_then(|slice| {
+        let noise_allowed = moved >= 2 || attempt > 0;
+        let demand = Demand { left: nu - below, right, last, seed, careful, noise_allowed, dimension: foreseen };
+        let done = slice(tools, &factor, demand, &mut handover);
+        if matches!(done, Err(Failure::Noise)) {
+            moved += 1;
+            drop(done);
+            symbolic.recycle(factor);
+            continue;
+        }
+        let done = done.map_err(Failure::into_trouble);
+        let done = done.and_then(|slice| {
             let count = slice.eigenvalues.len();
             let own = blocks.get_mut(..count.div_ceil(WIDTH));
             let own = own.ok_or_else(|| Trouble::Again("more slices than foreseen".into()))?;
@@ -149,7 +158,7 @@ pub(crate) fn chain(
         let (residuals, slice) = done?;
         // What a slice needed is what the next one will need, unless it had to start from nothing.
         dimension = Some(if alone { (2 + HAND_OVER) * pairs } else { slice.dimension });
-        again = 0;
+        (again, moved) = (0, 0);
 
         // The slice before knew which eigenvalue comes next. Another one here means that one of both missed a pair.
         let near = |a: f64, b: f64| (a - b).abs() <= 10.0 * tools.tolerance * tools.top;

@@ -5,12 +5,13 @@
 
 use std::sync::OnceLock;
 
-use faer::{Mat, Side};
+use faer::Mat;
 use rayon::prelude::*;
 
 use crate::eigen::assemble::{Joined, assemble, check_counts};
 use crate::eigen::block::{Block, Pool, Row, WIDTH};
 use crate::eigen::chain::{Found, Span, blocks_needed, chain, slices_expected};
+use crate::eigen::dense;
 use crate::eigen::factor::{Factor, Symbolic};
 use crate::eigen::kernel::Kind;
 use crate::eigen::order::{elimination_order, permuted};
@@ -150,12 +151,11 @@ impl Component {
         for i in 0..n {
             self.matrix.row(i).for_each(|(j, value)| a[(i, j)] = value);
         }
-        let pairs = a.self_adjoint_eigen(Side::Lower).map_err(|_| EigenError::NotConverged {
+        let (values, u) = dense::symmetric(&a).ok_or_else(|| EigenError::NotConverged {
             found: 0,
             wanted: n,
             detail: "the dense solver did not converge".into(),
         })?;
-        let u = pairs.U();
         let mut vectors = Block::zeros(n * n.div_ceil(WIDTH));
         for (b, block) in vectors.chunks_exact_mut(n).enumerate() {
             for c in 0..WIDTH.min(n - WIDTH * b) {
@@ -163,7 +163,7 @@ impl Component {
             }
         }
         Ok(Pairs {
-            eigenvalues: pairs.S().column_vector().iter().map(|e| e * self.unit).collect(),
+            eigenvalues: values.iter().map(|value| value * self.unit).collect(),
             vectors,
             places: (0..n).collect(),
             residuals: None,

@@ -6,7 +6,7 @@
 //! Tall blocks do not fit in any cache, so every product reads each of them once, panel by panel, for as many columns
 //! as the registers hold; the lines that come next are asked for ahead of time.
 
-use crate::eigen::block::{Row, SMALL_ZERO, Small, WIDTH, ZERO, add, transpose};
+use crate::eigen::block::{Row, SMALL_ZERO, Small, WIDTH, ZERO, add};
 use crate::eigen::factor::Pivots;
 use crate::eigen::front::{Tree, Workspace, factor_with};
 use crate::eigen::polish::{Levels, chebyshev_with};
@@ -227,31 +227,103 @@ fn update_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>
     }
 }
 
-/// W += Σ_k Q_k C_k, then out_i = P_iᵀ W and, after them, Wᵀ W, in one pass.
+/// out += Qᵀ W for R rows, of which W's are at hand.
+#[inline(always)]
+fn outer_of_few<A: Arithmetic, const R: usize, const HIGH: usize>(q: &[Row], w: &[Row; R], out: &mut Small) {
+    for high in (0..WIDTH).step_by(HIGH) {
+        let mut sum = [ZERO; HIGH];
+        sum.copy_from_slice(&out[high..high + HIGH]);
+        for r in 0..R {
+            let w = w[r];
+            for a in 0..HIGH {
+                add_scaled::<A>(&mut sum[a], q[r][high + a], &w);
+            }
+        }
+        out[high..high + HIGH].copy_from_slice(&sum);
+    }
+}
+
+/// The same for two blocks at once: an entry of Q, once read, serves both.
+#[inline(always)]
+fn outer_of_two<A: Arithmetic, const R: usize>(q: &[Row], w: [&[Row; R]; 2], out: [&mut Small; 2]) {
+    const HALF: usize = WIDTH / 2;
+    let [out, other] = out;
+    for high in [0, HALF] {
+        let mut sums = [[ZERO; HALF]; 2];
+        sums[0].copy_from_slice(&out[high..high + HALF]);
+        sums[1].copy_from_slice(&other[high..high + HALF]);
+        for r in 0..R {
+            for a in 0..HALF {
+                for p in 0..2 {
+                    add_scaled::<A>(&mut sums[p][a], q[r][high + a], &w[p][r]);
+                }
+            }
+        }
+        out[high..high + HALF].copy_from_slice(&sums[0]);
+        other[high..high + HALF].copy_from_slice(&sums[1]);
+    }
+}
+
+/// What `recur` does for the R rows that start at `at`.
+#[inline(always)]
+fn recur_few<A: Arithmetic, const R: usize, const HIGH: usize>(
+    q: &[&[Row]],
+    c: &[Small],
+    w: &mut [Row],
+    p: &[&[Row]],
+    v: &[Row],
+    out: &mut [Small],
+    at: usize,
+) {
+    let mut sum = [ZERO; R];
+    sum.copy_from_slice(&w[at..at + R]);
+    for (q, c) in q.iter().zip(c) {
+        (0..R).for_each(|r| prefetch(q, at + AHEAD + r));
+        let q = &q[at..at + R];
+        for a in 0..WIDTH {
+            for r in 0..R {
+                add_scaled::<A>(&mut sum[r], q[r][a], &c[a]);
+            }
+        }
+    }
+    w[at..at + R].copy_from_slice(&sum);
+    (0..R).for_each(|r| prefetch(w, at + AHEAD + r));
+    let (with_w, with_v) = out.split_at_mut(p.len() + 1);
+    let mut of_v = [ZERO; R];
+    if !v.is_empty() {
+        of_v.copy_from_slice(&v[at..at + R]);
+    }
+    for (i, p) in p.iter().enumerate() {
+        if q.get(i).is_none_or(|q| q.as_ptr() != p.as_ptr()) {
+            (0..R).for_each(|r| prefetch(p, at + AHEAD + r));
+        }
+        let p = &p[at..at + R];
+        match with_v.get_mut(i) {
+            Some(with_v) => outer_of_two::<A, R>(p, [&sum, &of_v], [&mut with_w[i], with_v]),
+            None => outer_of_few::<A, R, HIGH>(p, &sum, &mut with_w[i]),
+        }
+    }
+    outer_of_few::<A, R, HIGH>(&w[at..at + R], &sum, &mut with_w[p.len()]);
+}
+
+/// W += Σ_k Q_k C_k, then out_i = P_iᵀ W and, after them, Wᵀ W and, unless V is empty, P_iᵀ V, in one pass.
 #[inline(always)]
 fn recur_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>(
     q: &[&[Row]],
     c: &[Small],
     w: &mut [Row],
     p: &[&[Row]],
+    v: &[Row],
     out: &mut [Small],
 ) {
     out.fill(SMALL_ZERO);
-    let mut q_panels = Vec::with_capacity(q.len());
-    for (number, w) in w.chunks_mut(PANEL).enumerate() {
-        let panel = PANEL * number..PANEL * number + w.len();
-        if !q.is_empty() {
-            q_panels.clear();
-            q_panels.extend(q.iter().map(|q| &q[panel.clone()]));
-            update_with::<A, R, HIGH, P>(&q_panels, c, &mut [w], true);
-        }
-        let mut ws = Vec::with_capacity(p.len() + 1);
-        ws.extend(p.iter().map(|p| &p[panel.clone()]));
-        ws.push(&*w);
-        // Wᵀ P_i two at a time, and turned at the end: W stays in the first cache.
-        gram_with::<A, R, HIGH, P>(&[&*w], &ws, out);
+    let whole = w.len() - w.len() % R;
+    for at in (0..whole).step_by(R) {
+        recur_few::<A, R, HIGH>(q, c, w, p, v, out, at);
     }
-    out.iter_mut().for_each(|out| *out = transpose(out));
+    for at in whole..w.len() {
+        recur_few::<A, 1, HIGH>(q, c, w, p, v, out, at);
+    }
 }
 
 /// W = (W + Σ_k Q_k C_k) S, a copy of it unless that is empty, and its Wᵀ W, in one pass.
@@ -373,8 +445,8 @@ dispatched! {
     gram = gram_with(blocks: &[&[Row]], ws: &[&[Row]], out: &mut [Small]);
     /// W_i (+)= Σ_k Q_k C_ki with C_ki = c[i·blocks + k], the layout of `gram`.
     update = update_with(blocks: &[&[Row]], c: &[Small], ws: &mut [&mut [Row]], add: bool);
-    /// W += Σ_k Q_k C_k, then out_i = P_iᵀ W and, after them, Wᵀ W, in one pass.
-    recur = recur_with(q: &[&[Row]], c: &[Small], w: &mut [Row], p: &[&[Row]], out: &mut [Small]);
+    /// W += Σ_k Q_k C_k, then out_i = P_iᵀ W and, after them, Wᵀ W and, unless V is empty, P_iᵀ V, in one pass.
+    recur = recur_with(q: &[&[Row]], c: &[Small], w: &mut [Row], p: &[&[Row]], v: &[Row], out: &mut [Small]);
     /// W = (W + Σ_k Q_k C_k) S, a copy of it unless that is empty, and its Wᵀ W, in one pass.
     scale = scale_with(
         q: &[&[Row]], c: &[Small], s: &Small, w: &mut [Row], copy: &mut [Row], square: &mut Small
@@ -426,13 +498,13 @@ pub(crate) mod tests {
         update(kind, &blocks, &smalls(6, 1), &mut ws.each_mut().map(|w| &mut w[..]), false);
         seen.extend(ws.concat());
         let (mut w, mut out) = (w, [SMALL_ZERO; 4]);
-        recur(kind, &blocks, &smalls(2, 2), &mut w, &[&p, &v, &q], &mut out);
+        recur(kind, &blocks, &smalls(2, 2), &mut w, &[&p, &v, &q], &[], &mut out);
         let direct: f64 = v.iter().zip(&w).map(|(v, w)| v[2] * w[6]).sum();
         assert!((out[1][2][6] - direct).abs() <= 1e-15 * rows as f64, "rounding of sums of products below 1");
         let direct: f64 = w.iter().map(|w| w[3] * w[7]).sum();
         assert!((out[3][3][7] - direct).abs() <= 1e-15 * rows as f64 * (1.0 + direct.abs()), "the same of more terms");
         seen.extend(out.concat());
-        recur(kind, &[], &[], &mut w, &[], &mut out[..1]);
+        recur(kind, &[], &[], &mut w, &[], &[], &mut out[..1]);
         seen.extend(out[0]);
         let (s, c, before, mut copy) = (smalls(1, 3)[0], smalls(2, 7), w.clone(), vec![ZERO; rows]);
         let mut square = SMALL_ZERO;

@@ -13,6 +13,7 @@ mod basis;
 mod block;
 mod chain;
 mod component;
+mod dense;
 mod factor;
 mod finish;
 mod front;

@@ -77,13 +77,22 @@ pub(crate) fn take_off(kind: Kind, blocks: &[&[Row]], c: &[Small], ws: &mut [&mu
     });
 }
 
-/// W += Σ_k Q_k C_k, then out_i = P_iᵀ W and, after them, Wᵀ W, in one pass.
-pub(crate) fn recur(kind: Kind, q: &[&[Row]], c: &[Small], w: &mut [Row], p: &[&[Row]], out: &mut [Small]) {
+/// W += Σ_k Q_k C_k, then out_i = P_iᵀ W and, after them, Wᵀ W and, if there is a V, P_iᵀ V, in one pass.
+pub(crate) fn recur(
+    kind: Kind,
+    q: &[&[Row]],
+    c: &[Small],
+    w: &mut [Row],
+    p: &[&[Row]],
+    v: Option<&[Row]>,
+    out: &mut [Small],
+) {
     let part = part(w.len());
     let one = |(number, w): (usize, &mut [Row])| {
         let rows = number * part..number * part + w.len();
-        let mut out = vec![SMALL_ZERO; p.len() + 1];
-        kernel::recur(kind, &of(q, &rows), c, w, &of(p, &rows), &mut out);
+        let mut out = vec![SMALL_ZERO; out.len()];
+        let v = v.map_or(&[][..], |v| &v[rows.clone()]);
+        kernel::recur(kind, &of(q, &rows), c, w, &of(p, &rows), v, &mut out);
         out
     };
     sum(w.par_chunks_mut(part).enumerate().map(one).collect(), out);
@@ -190,7 +199,7 @@ mod tests {
             take_off(kind, &blocks, &smalls(2), &mut [&mut w]);
             seen.push(w.clone());
             let mut out = vec![SMALL_ZERO; 2];
-            recur(kind, &blocks, &smalls(2), &mut w, &[&q], &mut out);
+            recur(kind, &blocks, &smalls(2), &mut w, &[&q], None, &mut out);
             let mut copy = vec![ZERO; rows];
             let square = scale(kind, &blocks, &smalls(2), &smalls(1)[0], &mut w, Some(&mut copy));
             assert_eq!(w, copy);

@@ -3,9 +3,10 @@
 
 use std::ops::Range;
 
-use faer::{Mat, Side};
+use faer::Mat;
 
 use crate::eigen::block::WIDTH;
+use crate::eigen::dense;
 
 /// H, growing by a block at a time.
 #[derive(Debug, Default)]
@@ -41,6 +42,11 @@ impl Projected {
         self.rows[j][i] = value;
     }
 
+    /// Adds to an entry and its mirror image.
+    pub(crate) fn add(&mut self, i: usize, j: usize, value: f64) {
+        self.set(i, j, self.rows[i][j] + value);
+    }
+
     /// One row, as long as the matrix is by now.
     pub(crate) fn row(&self, k: usize) -> &[f64] {
         &self.rows[k]
@@ -58,13 +64,11 @@ impl Projected {
     /// computed (not finite).
     pub(crate) fn ritz(&self, m: usize) -> Option<Ritz> {
         let h = Mat::from_fn(m, m, |i, j| self.rows[i][j]);
-        let pairs = h.self_adjoint_eigen(Side::Lower).ok()?;
-        let values: Vec<f64> = pairs.S().column_vector().iter().copied().collect();
-        let vectors = pairs.U().to_owned();
+        let (values, vectors) = dense::symmetric(&h)?;
         let first = self.coupled_to(m).start;
         let coupling = |k: usize, a: usize| (first..m).map(|i| self.rows[m + a][i] * vectors[(i, k)]).sum();
         let couplings = (0..m).map(|k| std::array::from_fn(|a| coupling(k, a))).collect();
-        values.iter().all(|value| value.is_finite()).then_some(Ritz { values, couplings, vectors })
+        Some(Ritz { values, couplings, vectors })
     }
 }
 

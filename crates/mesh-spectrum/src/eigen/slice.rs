@@ -37,6 +37,18 @@ pub(crate) struct Tools<'a> {
     pub(crate) norm: f64,
 }
 
+impl Tools<'_> {
+    /// The residual that vectors are left with: a tenth in hand, because λ_K lies a little below the top, and no less than
+    /// rounding leaves.
+    fn allowed(&self) -> f64 {
+        (0.9 * self.tolerance * self.top).max(ROUNDING * self.norm)
+    }
+}
+
+/// The backward error of a factor, beside the residual allowed, with which its vectors cannot be saved: polishing takes
+/// away what of it lies at high frequencies, a tenth to a half stays.
+const NOISE_MAX: f64 = 50.0;
+
 /// What a slice is asked for.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Demand {
@@ -48,8 +60,10 @@ pub(crate) struct Demand {
     pub(crate) last: bool,
     /// For the random start.
     pub(crate) seed: u64,
-    /// Orthogonalise at every step.
+    /// Go through the whole basis at every step.
     pub(crate) careful: bool,
+    /// Whatever the factor's backward error.
+    pub(crate) noise_allowed: bool,
     /// The dimension at which to look for the first time, if the slice before lets it be foreseen.
     pub(crate) dimension: Option<usize>,
 }
@@ -77,6 +91,29 @@ pub(crate) enum Trouble {
     Again(String),
 }
 
+/// Why a slice has not found its pairs.
+#[derive(Debug)]
+pub(crate) enum Failure {
+    /// Solves with this factor lose too many digits; nothing has been spent but one.
+    Noise,
+    Trouble(Trouble),
+}
+
+impl Failure {
+    pub(crate) fn into_trouble(self) -> Trouble {
+        match self {
+            Failure::Noise => Trouble::Again("solves lose too many digits".into()),
+            Failure::Trouble(trouble) => trouble,
+        }
+    }
+}
+
+impl<T: Into<Trouble>> From<T> for Failure {
+    fn from(trouble: T) -> Failure {
+        Failure::Trouble(trouble.into())
+    }
+}
+
 impl From<EigenError> for Trouble {
     fn from(error: EigenError) -> Trouble {
         Trouble::Fatal(error)
@@ -89,7 +126,7 @@ pub(crate) fn slice<'a>(
     factor: &'a Factor,
     demand: Demand,
     handover: &mut Option<Handover>,
-) -> Result<Slice<'a>, Trouble> {
+) -> Result<Slice<'a>, Failure> {
     let mut space = Krylov::new(*tools, factor, demand.seed, handover.take(), demand.careful);
     match grow(tools, factor, demand, &mut space) {
         Ok(Chosen { ritz, chosen, beyond, dimension }) => {
@@ -112,16 +149,16 @@ struct Chosen {
 }
 
 /// Grows the space until the pairs demanded are in it.
-fn grow(tools: &Tools, factor: &Factor, demand: Demand, space: &mut Krylov) -> Result<Chosen, Trouble> {
-    let Demand { left, right, last, careful, dimension: foreseen, seed: _ } = demand;
+fn grow(tools: &Tools, factor: &Factor, demand: Demand, space: &mut Krylov) -> Result<Chosen, Failure> {
+    let Demand { left, right, last, noise_allowed, dimension: foreseen, .. } = demand;
     // Measured on sheet meshes. A space a little too large costs a step, one too small another projected problem.
     let mut next = foreseen.unwrap_or(90 + 2 * (left + right) + left.abs_diff(right));
     let (mut rate, mut before) = (RATE, None);
     loop {
         tools.progress.go_on()?;
-        space.step()?;
-        if !careful && space.is_noisy() {
-            return Err(Trouble::Again(format!("solves at the shift {:e} lose too many digits", factor.shift)));
+        space.step(space.dimension() + WIDTH >= next)?;
+        if !noise_allowed && space.backward_error() > NOISE_MAX * tools.allowed() {
+            return Err(Failure::Noise);
         }
         if space.dimension() < next && space.can_grow() {
             continue;
@@ -153,9 +190,9 @@ fn grow(tools: &Tools, factor: &Factor, demand: Demand, space: &mut Krylov) -> R
         }
         if !space.can_grow() || dimension > 400 + 20 * (left + right) {
             let (below, above, shift) = (below.len(), above.len(), factor.shift);
-            return Err(Trouble::Again(format!(
+            return Err(Failure::Trouble(Trouble::Again(format!(
                 "{below} of {left} pairs below and {above} of {right} above the shift {shift:e} after {dimension} vectors"
-            )));
+            ))));
         }
         let steps = (excess.ln() / rate.ln()).ceil() as usize; // not a number: 0
         next = dimension + WIDTH * steps.clamp(1, STEPS);
@@ -247,8 +284,7 @@ fn settle(
     [x, y]: &mut [Block; 2],
 ) -> Result<Vec<f64>, Trouble> {
     let Tools { matrix, kind, norm, .. } = *tools;
-    // A tenth in hand, because λ_K lies a little below the top; and no less than rounding leaves.
-    let allowed = (0.9 * tools.tolerance * tools.top).max(ROUNDING * norm);
+    let allowed = tools.allowed();
     let mut shifts = ZERO;
     shifts[..eigenvalues.len()].copy_from_slice(eigenvalues);
     let measure = |block: &[Row]| {

@@ -10,6 +10,7 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::pencil::{Factor, Pencil, times};
+use crate::eigen::dense;
 use crate::eigen::seconds::{Clock, Step};
 use crate::eigen::slice::Trouble;
 use crate::eigen::{EigenError, Progress};
@@ -203,8 +204,7 @@ impl<'a> Krylov<'a> {
                 }
             }
         }
-        let eigen = t.self_adjoint_eigen(Side::Lower).ok()?;
-        Some((eigen.S().column_vector().iter().copied().collect(), eigen.U().to_owned()))
+        dense::symmetric(&t)
     }
 
     /// R s_last of one Ritz vector.

@@ -14,6 +14,7 @@ use faer::{Conj, Mat, MatMut, Par, Side};
 use super::Pairs;
 use crate::eigen::EigenError;
 use crate::eigen::chain::{GROWTH_MAX, PIVOT_MIN};
+use crate::eigen::dense;
 use crate::eigen::seconds::{Clock, Step};
 use crate::eigen::weyl::Weyl;
 use crate::operator::{Csr, Operator};
@@ -201,11 +202,8 @@ impl Pencil {
         let mut c = c.transpose().to_owned();
         lower(c.as_mut());
         let symmetric = Mat::from_fn(n, n, |i, j| 0.5 * (c[(i, j)] + c[(j, i)]));
-        let pairs =
-            symmetric.self_adjoint_eigen(Side::Lower).map_err(|_| failed("the dense solver did not converge"))?;
-        let mut v = pairs.U().to_owned();
+        let (theta, mut v) = dense::symmetric(&symmetric).ok_or_else(|| failed("the dense solver did not converge"))?;
         faer::linalg::triangular_solve::solve_upper_triangular_in_place(g.L().transpose(), v.as_mut(), Par::Seq);
-        let theta = pairs.S().column_vector();
         let order: Vec<usize> = if inverse { (0..n).rev().collect() } else { (0..n).collect() };
         let eigenvalue = |&k: &usize| if inverse { 1.0 / theta[k].max(f64::MIN_POSITIVE) - s } else { theta[k] };
         Ok(Pairs {
