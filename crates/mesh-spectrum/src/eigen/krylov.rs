@@ -234,7 +234,8 @@ impl<'a> Krylov<'a> {
         WIDTH * (self.basis.len() + 1) <= self.n
     }
 
-    /// Grows the space by one block.
+    /// Grows the space by one block. `last`: what is known of its orthogonality is to be measured, because it may be left
+    /// as it is.
     ///
     /// # Errors
     /// [`EigenError::Stopped`].
@@ -251,8 +252,8 @@ impl<'a> Krylov<'a> {
         if self.steps == 0 {
             self.backward_error = clock.time(Step::Orthogonalise, || self.measure(&w));
         }
-        let repaired = clock.time(Step::Orthogonalise, || self.recur(w));
-        if repaired { self.form_nearest() } else { Ok(()) }
+        let whole = clock.time(Step::Orthogonalise, || self.recur(w));
+        if whole { self.form_nearest() } else { Ok(()) }
     }
 
     /// max ‖(A − σ) w − q‖ / ‖w‖ for the columns of W = Op Q: the norm of the matrix by which the one that was factored
@@ -360,10 +361,11 @@ impl<'a> Krylov<'a> {
                 }
             }
             None => {
-                let foreseen = self.loss.foreseen(&self.projected, alpha, &transpose(&before));
-                for (k, off) in self.nearest_kept.clone().zip(&off[1..]) {
+                let nearest = self.nearest_kept.clone();
+                let foreseen = self.loss.foreseen(nearest.clone(), &self.projected, alpha, &transpose(&before));
+                for ((k, off), foreseen) in nearest.zip(&off[1..]).zip(foreseen) {
                     for a in 0..WIDTH {
-                        (0..WIDTH).for_each(|c| found[WIDTH * k + a][c] = off[a][c] - foreseen[k][a][c]);
+                        (0..WIDTH).for_each(|c| found[WIDTH * k + a][c] = off[a][c] - foreseen[a][c]);
                     }
                 }
                 self.loss.step(&self.projected, alpha, &before, inverse, &mut self.random);
@@ -383,8 +385,7 @@ impl<'a> Krylov<'a> {
         }
         self.measured = whole.is_some();
         self.lost.push(self.loss.known().to_vec());
-        let expected = self.loss.expected(&self.projected, alpha, r, inverse);
-        self.due = expected.iter().zip(LOSS_MAX).any(|(expected, most)| *expected > most);
+        self.due = self.loss.is_due(LOSS_MAX, &self.projected, alpha, r, inverse);
     }
 
     /// Takes off W = Op Q_j what it has in common with the two blocks before it and with those nearest to the shift.
@@ -416,7 +417,7 @@ impl<'a> Krylov<'a> {
         let mut alpha = gram_of(kind, blocks[last], w);
         let rounding = negative(&product(&self.rounding, &alpha));
         add(&mut alpha, &rounding);
-        let mut c = self.loss.foreseen(&self.projected, &alpha, &transpose(&self.coupling));
+        let mut c = self.loss.foreseen(0..last, &self.projected, &alpha, &transpose(&self.coupling));
         let along = self.kept_along(&alpha);
         c.iter_mut().zip(&along).for_each(|(c, along)| add(c, along));
         if self.steps > 0 {

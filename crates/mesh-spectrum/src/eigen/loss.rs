@@ -25,6 +25,9 @@ use crate::eigen::projected::Projected;
 /// Rounding of an inner product of unit vectors.
 const ROUNDING: f64 = 2e-16;
 
+/// By how much a step multiplies a loss, at most: beside the shift, by 200.
+const GROWTH_MAX: f64 = 1e3;
+
 /// The products of the last block of a space, and of the one before it, with every column before them.
 #[derive(Debug, Default)]
 struct Omega {
@@ -108,10 +111,15 @@ impl Loss {
         self.scale = (0..WIDTH).fold(self.scale, |most, i| most.max(alpha[i][i].abs()));
     }
 
-    /// What Op times the last block has in common with the blocks before it, beside what the recurrence takes off.
-    pub(crate) fn foreseen(&self, projected: &Projected, alpha: &Small, back: &Small) -> Vec<Small> {
-        let rows: Vec<Row> = (0..self.known.now.len()).map(|k| self.known.row(k, projected, alpha, back)).collect();
-        rows.chunks_exact(WIDTH).map(|rows| std::array::from_fn(|a| rows[a])).collect()
+    /// What Op times the last block has in common with some of the blocks before it, beside what the recurrence takes off.
+    pub(crate) fn foreseen(
+        &self,
+        blocks: Range<usize>,
+        projected: &Projected,
+        alpha: &Small,
+        back: &Small,
+    ) -> Vec<Small> {
+        blocks.map(|k| std::array::from_fn(|a| self.known.row(WIDTH * k + a, projected, alpha, back))).collect()
     }
 
     /// Follows a step that did not go through the basis: the α of the block multiplied, the R before it and the inverse of
@@ -188,18 +196,26 @@ impl Loss {
         self.unknown.now.fill(ZERO);
     }
 
-    /// The largest entries to be expected after the next step, if that is like the last: of what is known, and of what is
-    /// not, the next noise apart.
-    pub(crate) fn expected(&self, projected: &Projected, alpha: &Small, r: &Small, inverse: &Small) -> [f64; 2] {
+    /// Whether more than so much is to be expected after the next step, if that is like the last: of what is known, and of
+    /// what is not, the next noise apart.
+    pub(crate) fn is_due(
+        &self,
+        allowed: [f64; 2],
+        projected: &Projected,
+        alpha: &Small,
+        r: &Small,
+        inverse: &Small,
+    ) -> bool {
         let back = transpose(r);
-        [&self.known, &self.unknown].map(|omega| {
-            if omega.is_zero() {
-                return 0.0;
+        [&self.known, &self.unknown].iter().zip(allowed).any(|(omega, allowed)| {
+            let largest = |rows: &[Row]| rows.as_flattened().iter().fold(0.0f64, |most, x| most.max(x.abs()));
+            if GROWTH_MAX * largest(&omega.now).max(largest(&omega.before)) < allowed {
+                return false;
             }
             let mut rows: Vec<Row> =
                 (0..omega.now.len()).map(|k| times(&omega.row(k, projected, alpha, &back), inverse)).collect();
             self.deflate_from(&mut rows);
-            rows.as_flattened().iter().fold(0.0f64, |most, x| most.max(x.abs()))
+            largest(&rows) > allowed
         })
     }
 
