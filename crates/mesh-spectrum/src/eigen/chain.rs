@@ -98,7 +98,7 @@ pub(crate) fn chain(
     let mut ahead: Vec<f64> = Vec::new();
     let mut handover: Option<Handover> = None;
     let mut dimension: Option<usize> = None;
-    // How often the slice has gone wrong, beyond the attempts before.
+    // How often the slice has gone wrong, beyond the attempts before, and how often its factor was too noisy to begin.
     let (mut again, mut moved) = (0, 0);
     let (mut below, mut low) = (first, low);
     for number in 0..slices_max(rows, end - first) {
@@ -134,8 +134,7 @@ pub(crate) fn chain(
             symbolic.recycle(factor);
             continue;
         }
-        let done = done.map_err(Failure::into_trouble);
-        let done = done.and_then(|slice| {
+        let done = done.map_err(Failure::into_trouble).and_then(|slice| {
             let count = slice.eigenvalues.len();
             let own = blocks.get_mut(..count.div_ceil(WIDTH));
             let own = own.ok_or_else(|| Trouble::Again("more slices than foreseen".into()))?;

@@ -227,40 +227,31 @@ fn update_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>
     }
 }
 
-/// out += Qᵀ W for R rows, of which W's are at hand.
-#[inline(always)]
-fn outer_of_few<A: Arithmetic, const R: usize, const HIGH: usize>(q: &[Row], w: &[Row; R], out: &mut Small) {
-    for high in (0..WIDTH).step_by(HIGH) {
-        let mut sum = [ZERO; HIGH];
-        sum.copy_from_slice(&out[high..high + HIGH]);
-        for r in 0..R {
-            let w = w[r];
-            for a in 0..HIGH {
-                add_scaled::<A>(&mut sum[a], q[r][high + a], &w);
-            }
-        }
-        out[high..high + HIGH].copy_from_slice(&sum);
-    }
-}
+/// Columns of Q at once for two W's: the registers hold as many sums as for one W and all columns.
+const HALF: usize = WIDTH / 2;
 
-/// The same for two blocks at once: an entry of Q, once read, serves both.
+/// out_p += Qᵀ W_p for R rows, of which the W's are at hand: an entry of Q, once read, serves all.
 #[inline(always)]
-fn outer_of_two<A: Arithmetic, const R: usize>(q: &[Row], w: [&[Row; R]; 2], out: [&mut Small; 2]) {
-    const HALF: usize = WIDTH / 2;
-    let [out, other] = out;
-    for high in [0, HALF] {
-        let mut sums = [[ZERO; HALF]; 2];
-        sums[0].copy_from_slice(&out[high..high + HALF]);
-        sums[1].copy_from_slice(&other[high..high + HALF]);
+fn outer_of_few<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>(
+    q: &[Row],
+    w: [&[Row; R]; P],
+    out: [&mut Small; P],
+) {
+    for high in (0..WIDTH).step_by(HIGH) {
+        let mut sum = [[ZERO; HIGH]; P];
+        for p in 0..P {
+            sum[p].copy_from_slice(&out[p][high..high + HIGH]);
+        }
         for r in 0..R {
-            for a in 0..HALF {
-                for p in 0..2 {
-                    add_scaled::<A>(&mut sums[p][a], q[r][high + a], &w[p][r]);
+            for a in 0..HIGH {
+                for p in 0..P {
+                    add_scaled::<A>(&mut sum[p][a], q[r][high + a], &w[p][r]);
                 }
             }
         }
-        out[high..high + HALF].copy_from_slice(&sums[0]);
-        other[high..high + HALF].copy_from_slice(&sums[1]);
+        for p in 0..P {
+            out[p][high..high + HIGH].copy_from_slice(&sum[p]);
+        }
     }
 }
 
@@ -275,18 +266,9 @@ fn recur_few<A: Arithmetic, const R: usize, const HIGH: usize>(
     out: &mut [Small],
     at: usize,
 ) {
-    let mut sum = [ZERO; R];
-    sum.copy_from_slice(&w[at..at + R]);
-    for (q, c) in q.iter().zip(c) {
-        (0..R).for_each(|r| prefetch(q, at + AHEAD + r));
-        let q = &q[at..at + R];
-        for a in 0..WIDTH {
-            for r in 0..R {
-                add_scaled::<A>(&mut sum[r], q[r][a], &c[a]);
-            }
-        }
-    }
-    w[at..at + R].copy_from_slice(&sum);
+    tile::<A, R, 1>(q, [c], &mut [&mut *w], at, true);
+    let mut of_w = [ZERO; R];
+    of_w.copy_from_slice(&w[at..at + R]);
     (0..R).for_each(|r| prefetch(w, at + AHEAD + r));
     let (with_w, with_v) = out.split_at_mut(p.len() + 1);
     let mut of_v = [ZERO; R];
@@ -299,11 +281,11 @@ fn recur_few<A: Arithmetic, const R: usize, const HIGH: usize>(
         }
         let p = &p[at..at + R];
         match with_v.get_mut(i) {
-            Some(with_v) => outer_of_two::<A, R>(p, [&sum, &of_v], [&mut with_w[i], with_v]),
-            None => outer_of_few::<A, R, HIGH>(p, &sum, &mut with_w[i]),
+            Some(with_v) => outer_of_few::<A, R, HALF, 2>(p, [&of_w, &of_v], [&mut with_w[i], with_v]),
+            None => outer_of_few::<A, R, HIGH, 1>(p, [&of_w], [&mut with_w[i]]),
         }
     }
-    outer_of_few::<A, R, HIGH>(&w[at..at + R], &sum, &mut with_w[p.len()]);
+    outer_of_few::<A, R, HIGH, 1>(&w[at..at + R], [&of_w], [&mut with_w[p.len()]]);
 }
 
 /// W += Σ_k Q_k C_k, then out_i = P_iᵀ W and, after them, Wᵀ W and, unless V is empty, P_iᵀ V, in one pass.

@@ -26,15 +26,15 @@
 //! that is no loss but what couples X to the block, because what is known of Op X is known only so well: it belongs into
 //! the projected operator.
 
+mod normalise;
+
 use std::ops::Range;
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use crate::eigen::EigenError;
-use crate::eigen::block::{
-    Block, Row, SMALL_ZERO, Small, WIDTH, ZERO, add, cholesky, inverse_of_upper, largest, negative, product, transpose,
-};
+use crate::eigen::block::{Block, Row, SMALL_ZERO, Small, WIDTH, ZERO, add, largest, negative, product, transpose};
 use crate::eigen::factor::Factor;
 use crate::eigen::kernel;
 use crate::eigen::loss::{Loss, times, uniform};
@@ -60,14 +60,6 @@ const ONE_PASS: f64 = 1e-3;
 /// By how much ‖Op‖ may be larger than the Ritz values that a space starts with say.
 const UNKNOWN: f64 = 4.0;
 
-/// A block no longer than this share of ‖Op‖ is rounding.
-const RANK: f64 = 1e-13;
-
-/// How ill-conditioned a block may be, and how much longer it may have been before the vectors next to it were taken off,
-/// if the products known by then are to orthonormalise it: rounding is multiplied by the squares of both.
-const CONDITION_MAX: f64 = 50.0;
-const TAKEN_MAX: f64 = 30.0;
-
 /// A Krylov space around one shift, growing by a block a step.
 pub(crate) struct Krylov<'a> {
     tools: Tools<'a>,
@@ -91,9 +83,7 @@ pub(crate) struct Krylov<'a> {
     /// QᵀQ − I of the last block, as far as it is known: rounding, which a step multiplies by the square of its α / R.
     rounding: Small,
     loss: Loss,
-    /// What each block after X has in common with all before it, as far as known: rows for their columns.
-    lost: Vec<Vec<Row>>,
-    /// That is measured, not foreseen.
+    /// What the last block has in common with all before it is measured, not foreseen.
     measured: bool,
     /// The next step is to go through the whole basis.
     due: bool,
@@ -155,7 +145,8 @@ struct Origin {
 }
 
 impl<'a> Krylov<'a> {
-    /// Starts from what another space left, or from eight random vectors. `careful`: orthogonalise at every step.
+    /// Starts from what another space left, or from eight random vectors. `careful`: go through the whole basis at
+    /// every step.
     pub(crate) fn new(
         tools: Tools<'a>,
         factor: &'a Factor,
@@ -179,8 +170,7 @@ impl<'a> Krylov<'a> {
             moved: 0.0,
             coupling: SMALL_ZERO,
             rounding: SMALL_ZERO,
-            loss: Loss::default(),
-            lost: Vec::new(),
+            loss: Loss::new(0, 0..0),
             measured: false,
             due: false,
             every_step: careful,
@@ -208,7 +198,7 @@ impl<'a> Krylov<'a> {
             let first =
                 ((closest + WIDTH / 2) / WIDTH).saturating_sub(NEAREST / 2).min((kept / WIDTH).saturating_sub(NEAREST));
             space.nearest_kept = first..(first + NEAREST).min(kept / WIDTH);
-            space.loss = Loss::after(kept, WIDTH * space.nearest_kept.start..WIDTH * space.nearest_kept.end);
+            space.loss = Loss::new(kept, WIDTH * space.nearest_kept.start..WIDTH * space.nearest_kept.end);
             (0..kept).for_each(|k| space.projected.set(k, k, space.start[k].value));
             space.basis = x;
             space.basis.push(q);
@@ -220,7 +210,6 @@ impl<'a> Krylov<'a> {
             space.orthonormalise(&mut start, square);
             space.basis.push(start);
         }
-        space.lost.push(space.loss.known().to_vec());
         space
     }
 
@@ -284,9 +273,9 @@ impl<'a> Krylov<'a> {
         let n = self.n;
         let all = (self.kept > 0 && self.steps < 2) || self.every_step || self.due;
         let mut product = if all { self.take_all(&mut w) } else { self.take_near(&mut w) };
-        if let Some(whole) = &product.whole {
+        if let (Some(whole), Some(known)) = (&product.whole, self.loss.known().last()) {
             // What the last block has in common with X comes back through what couples it to X.
-            for (along, known) in whole.along.as_flattened().iter().zip(self.loss.known()) {
+            for (along, known) in whole.along.as_flattened().iter().zip(known) {
                 for (alpha, along) in product.alpha.iter_mut().zip(along) {
                     (0..WIDTH).for_each(|c| alpha[c] -= along * known[c]);
                 }
@@ -319,20 +308,6 @@ impl<'a> Krylov<'a> {
         all
     }
 
-    /// R and R⁻¹ of a W that its known square does not allow to normalise; W becomes Q.
-    fn normalise(&mut self, w: &mut Block, product: &mut Product) -> (Small, Small) {
-        let (n, kind) = (self.n, self.tools.kind);
-        parts::take_off(kind, &self.next_to(), &product.off, &mut [&mut w[..n]]);
-        if let Some(Whole { left, .. }) = &mut product.whole {
-            let blocks: Vec<&[Row]> = self.basis.iter().map(|block| &block[..n]).collect();
-            parts::take_off(kind, &blocks, left, &mut [&mut w[..n]]);
-            left.fill(SMALL_ZERO);
-        }
-        let square = gram_of(kind, &w[..n], &w[..n]);
-        let r = self.orthonormalise(w, square);
-        (r, inverse_of_upper(&r))
-    }
-
     /// Notes what a step has found, in the projected operator and about the loss of orthogonality.
     fn follow(&mut self, Product { alpha, off, whole, .. }: &Product, r: &Small, inverse: &Small) {
         let before = std::mem::replace(&mut self.coupling, *r);
@@ -342,10 +317,7 @@ impl<'a> Krylov<'a> {
         match whole {
             Some(Whole { along, found: measured, left, of_last }) => {
                 if let Some(of_last) = of_last {
-                    if let Some(lost) = self.lost.last_mut() {
-                        lost.clone_from(of_last);
-                    }
-                    let correction = self.loss.correct(of_last.clone());
+                    let correction = self.loss.correct(of_last);
                     // It was Op that did it, in the step before.
                     for (k, row) in correction.iter().enumerate().take(if self.steps > 0 { self.kept } else { 0 }) {
                         let coupled = times(row, &before);
@@ -384,7 +356,6 @@ impl<'a> Krylov<'a> {
             self.loss.clean(); // random vectors in the place of some
         }
         self.measured = whole.is_some();
-        self.lost.push(self.loss.known().to_vec());
         self.due = self.loss.is_due(LOSS_MAX, &self.projected, alpha, r, inverse);
     }
 
@@ -393,7 +364,7 @@ impl<'a> Krylov<'a> {
         let (n, last) = (self.n, self.basis.len() - 1);
         let next_to = self.next_to();
         let mut c = vec![SMALL_ZERO; next_to.len() + 1];
-        let back = negative(&transpose(&self.coupling));
+        let back = transpose(&self.coupling);
         let before: &[&[Row]] = if self.steps > 0 { &[&self.basis[last - 1][..n]] } else { &[] };
         parts::recur(self.tools.kind, before, &[back], &mut w[..n], &next_to, None, &mut c);
         let mut square = c.pop().unwrap_or(SMALL_ZERO);
@@ -424,13 +395,12 @@ impl<'a> Krylov<'a> {
             add(&mut c[last - 1], &transpose(&self.coupling));
         }
         c.push(alpha);
-        let minus: Vec<Small> = c.iter().map(negative).collect();
         let mut measured = blocks.clone();
         measured.extend(self.nearest.iter().map(|block| &block[..n]));
         // What the last block has in common with the others is known only if that was measured.
         let both = !self.measured;
         let mut left = vec![SMALL_ZERO; measured.len() * if both { 2 } else { 1 } + 1];
-        parts::recur(kind, &blocks, &minus, w, &measured, both.then_some(blocks[last]), &mut left);
+        parts::recur(kind, &blocks, &c, w, &measured, both.then_some(blocks[last]), &mut left);
         let of_last = left.split_off(measured.len() + 1);
         let mut square = left.pop().unwrap_or(SMALL_ZERO);
         let of_last = both.then(|| of_last[..last].concat());
@@ -463,7 +433,6 @@ impl<'a> Krylov<'a> {
 
     /// What Op Q_j has in common with X, to which the first two blocks are coupled.
     fn kept_along(&self, alpha: &Small) -> Vec<Small> {
-        let dot = |a: &[f64; WIDTH], b: &[f64; WIDTH]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let row = |k: usize| -> Row {
             match self.steps {
                 0 => std::array::from_fn(|a| self.start[k].g[a] + self.moved * dot(&alpha[a], &self.start[k].g)),
@@ -480,15 +449,6 @@ impl<'a> Krylov<'a> {
         let mut blocks: Vec<&Block> = self.basis.last().into_iter().collect();
         blocks.extend(self.basis[self.nearest_kept.clone()].iter().chain(&self.nearest));
         blocks.into_iter().map(|block| &block[..self.n]).collect()
-    }
-
-    /// R and R⁻¹ for a block W with Wᵀ W = `square`, of which columns up to `taken` long were the rest, unless that is too
-    /// little to orthonormalise it.
-    fn normaliser(&self, square: &Small, taken: f64) -> Option<(Small, Small)> {
-        let (r, inverse) = cholesky(square)?;
-        let (least, most) = ends(&r);
-        let good = most > RANK * self.scale && most < CONDITION_MAX * least && taken < TAKEN_MAX * least;
-        good.then_some((r, inverse))
     }
 
     /// Forms the Ritz vectors nearest to the shift, if there is no X to take them from and they are worth it by now.
@@ -515,7 +475,6 @@ impl<'a> Krylov<'a> {
     /// The part of the projected operator that X and the first two blocks share, once Xᵀ Op Q is known.
     fn project_kept(&mut self, along: &[Row], r: &Small) {
         let at = self.kept;
-        let dot = |a: &Row, b: &Row| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         for (i, start) in self.start.iter().enumerate() {
             for j in 0..=i {
                 let both = dot(&along[i], &self.start[j].g) + dot(&along[j], &start.g); // symmetric but for rounding
@@ -526,83 +485,6 @@ impl<'a> Krylov<'a> {
                 self.projected.set(at + WIDTH + a, i, self.moved * dot(r, &start.g));
             }
         }
-    }
-
-    /// W −= B Bᵀ W over the whole basis; returns the coefficients, a block's after another's.
-    fn orthogonalise(&self, w: &mut [Row]) -> Vec<Small> {
-        let blocks: Vec<&[Row]> = self.basis.iter().map(|block| &block[..self.n]).collect();
-        let mut c = vec![SMALL_ZERO; blocks.len()];
-        parts::gram(self.tools.kind, &blocks, &[&w[..self.n]], &mut c);
-        parts::take_off(self.tools.kind, &blocks, &c, &mut [&mut w[..self.n]]);
-        c
-    }
-
-    /// W = Q R with R upper triangular; W becomes Q. `square` is Wᵀ W. Cholesky of it, again while R is ill-conditioned
-    /// (the loss of orthogonality is 1e-16 times the square of its condition); columns one by one if W has lost rank.
-    fn orthonormalise(&mut self, w: &mut Block, mut square: Small) -> Small {
-        let n = self.n;
-        let mut total: Option<Small> = None;
-        self.rounding = SMALL_ZERO;
-        for _ in 0..4 {
-            let Some((r, inverse)) = cholesky(&square) else {
-                break;
-            };
-            let (least, most) = ends(&r);
-            if most <= RANK * self.scale {
-                break; // an invariant subspace: what is left of W is rounding
-            }
-            parts::scale(self.tools.kind, &[], &[], &inverse, &mut w[..n], None);
-            total = Some(total.map_or(r, |total| product(&r, &total)));
-            if most / least < CONDITION_MAX {
-                return total.unwrap_or(r);
-            }
-            // Scaling up by 1/R amplified what was left along the basis.
-            if most / least > 1e6 {
-                self.orthogonalise(w);
-            }
-            square = gram_of(self.tools.kind, &w[..n], &w[..n]);
-        }
-        let rounding = if total.is_none() { 1e-12 * self.scale } else { 0.0 };
-        let r = self.fill_up(w, rounding);
-        total.map_or(r, |total| product(&r, &total))
-    }
-
-    /// Gram-Schmidt column by column; a column that depends on those before it, or is no longer than `rounding`, gets a
-    /// zero row in R and is replaced by a random vector orthogonal to everything. The recurrence still holds, but its
-    /// loss can no longer be foreseen.
-    fn fill_up(&mut self, w: &mut Block, rounding: f64) -> Small {
-        self.every_step = true;
-        let w = &mut w[..self.n];
-        let mut r = SMALL_ZERO;
-        for j in 0..WIDTH {
-            let before = norm_of(w, j);
-            for _ in 0..2 {
-                for i in 0..j {
-                    let along: f64 = w.iter().map(|row| row[i] * row[j]).sum();
-                    w.iter_mut().for_each(|row| row[j] -= along * row[i]);
-                    r[i][j] += along;
-                }
-            }
-            let left = norm_of(w, j);
-            if left > 1e-10 * before && left > rounding {
-                r[j][j] = left;
-                w.iter_mut().for_each(|row| row[j] /= left);
-                continue;
-            }
-            let mut fresh = vec![ZERO; self.n];
-            fresh.iter_mut().for_each(|row| row[j] = uniform(&mut self.random));
-            for _ in 0..2 {
-                self.orthogonalise(&mut fresh);
-                for i in 0..j {
-                    let along: f64 = w.iter().zip(&fresh).map(|(w, f)| w[i] * f[j]).sum();
-                    fresh.iter_mut().zip(w.iter()).for_each(|(f, w)| f[j] -= along * w[i]);
-                }
-                let norm = norm_of(&fresh, j);
-                fresh.iter_mut().for_each(|row| row[j] /= norm);
-            }
-            w.iter_mut().zip(&fresh).for_each(|(w, f)| w[j] = f[j]);
-        }
-        r
     }
 
     /// Eigenpairs of the projected operator; `None` if they cannot be computed (not finite).
@@ -620,7 +502,7 @@ impl<'a> Krylov<'a> {
     /// Takes off coefficients along so many blocks what the blocks have in common.
     fn clear(&self, c: &mut [Small], used: usize) {
         for c in c.chunks_exact_mut(used) {
-            for (number, lost) in self.lost.iter().enumerate() {
+            for (number, lost) in self.loss.known().iter().enumerate() {
                 let Some(own) = c.get(self.kept / WIDTH + number).copied() else { continue };
                 for (at, lost) in lost.iter().enumerate() {
                     let row = &mut c[at / WIDTH][at % WIDTH];
@@ -659,8 +541,9 @@ impl<'a> Krylov<'a> {
         let Tools { kind, progress, pool, .. } = self.tools;
         let used = self.basis.len();
         let mut c = coefficients(ritz, chosen, used);
-        c.resize(c.len() + used, SMALL_ZERO);
-        (0..WIDTH).for_each(|a| c.last_mut().unwrap()[a][a] = 1.0);
+        // And the block that comes next, as it is.
+        c.resize(c.len() + used - 1, SMALL_ZERO);
+        c.push(std::array::from_fn(|a| std::array::from_fn(|k| f64::from(a == k))));
         self.clear(&mut c, used);
         let mut blocks: Vec<&mut [Row]> = self.basis.iter_mut().map(|block| &mut block[..self.n]).collect();
         progress.clock.time(Step::Vectors, || parts::combine_in_place(kind, &mut blocks, &c, progress))?;
@@ -698,23 +581,18 @@ fn coefficients(ritz: &Ritz, chosen: &[usize], blocks: usize) -> Vec<Small> {
     c
 }
 
-/// The least and the largest diagonal entry.
-fn ends(r: &Small) -> (f64, f64) {
-    (0..WIDTH).fold((f64::INFINITY, 0.0f64), |(least, most), i| (least.min(r[i][i]), most.max(r[i][i])))
-}
-
 impl Drop for Krylov<'_> {
     fn drop(&mut self) {
         self.tools.pool.give(self.basis.drain(..).chain(self.nearest.drain(..)).chain(self.ahead.take()));
     }
 }
 
-fn sum(a: &Row, b: &Row) -> Row {
-    std::array::from_fn(|k| a[k] + b[k])
+fn dot(a: &Row, b: &Row) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-fn norm_of(block: &[Row], column: usize) -> f64 {
-    block.iter().map(|row| row[column] * row[column]).sum::<f64>().sqrt()
+fn sum(a: &Row, b: &Row) -> Row {
+    std::array::from_fn(|k| a[k] + b[k])
 }
 
 #[cfg(test)]

@@ -28,25 +28,33 @@ const ROUNDING: f64 = 2e-16;
 /// By how much a step multiplies a loss, at most: beside the shift, by 200.
 const GROWTH_MAX: f64 = 1e3;
 
-/// The products of the last block of a space, and of the one before it, with every column before them.
-#[derive(Debug, Default)]
-struct Omega {
-    now: Vec<Row>,
-    before: Vec<Row>,
-}
+/// The products of each block of a space with every column before it, of which a step needs the last two.
+#[derive(Debug)]
+struct Omega(Vec<Vec<Row>>);
 
 impl Omega {
+    /// Those of the last block.
+    fn now(&self) -> &[Row] {
+        self.0.last().map_or(&[], |now| now)
+    }
+
+    /// Those of the block before it.
+    fn before(&self) -> &[Row] {
+        self.0.iter().rev().nth(1).map_or(&[], |before| before)
+    }
+
     /// What a step makes of row k, before R.
     fn row(&self, k: usize, projected: &Projected, alpha: &Small, back: &Small) -> Row {
+        let (now, before) = (self.now(), self.before());
         let mut sum = ZERO;
         let coupled = projected.coupled_to(k);
-        let coupled = coupled.start..coupled.end.min(self.now.len());
-        for (h, omega) in projected.row(k)[coupled.clone()].iter().zip(&self.now[coupled]) {
+        let coupled = coupled.start..coupled.end.min(now.len());
+        for (h, omega) in projected.row(k)[coupled.clone()].iter().zip(&now[coupled]) {
             add_scaled::<Plain>(&mut sum, *h, omega);
         }
         for a in 0..WIDTH {
-            add_scaled::<Plain>(&mut sum, -self.now[k][a], &alpha[a]);
-            if let Some(before) = self.before.get(k) {
+            add_scaled::<Plain>(&mut sum, -now[k][a], &alpha[a]);
+            if let Some(before) = before.get(k) {
                 add_scaled::<Plain>(&mut sum, -before[a], &back[a]);
             }
         }
@@ -55,16 +63,12 @@ impl Omega {
 
     /// There is nothing, and nothing comes of it.
     fn is_zero(&self) -> bool {
-        self.now.iter().chain(&self.before).all(|row| *row == ZERO)
-    }
-
-    fn push(&mut self, next: Vec<Row>) {
-        self.before = std::mem::replace(&mut self.now, next);
+        self.now().iter().chain(self.before()).all(|row| *row == ZERO)
     }
 }
 
-/// What the last two blocks of a space have in common with all before them.
-#[derive(Debug, Default)]
+/// What the blocks of a space have in common with all before them.
+#[derive(Debug)]
 pub(crate) struct Loss {
     /// What was measured and left in the blocks, and what has become of it.
     known: Omega,
@@ -82,18 +86,25 @@ pub(crate) struct Loss {
 }
 
 impl Loss {
-    /// For a space that starts with so many columns and a block orthogonal to them, and orthogonalises every block
-    /// against some of them.
-    pub(crate) fn after(columns: usize, deflated: Range<usize>) -> Loss {
+    /// For a space that starts with so many columns, if any, and a block orthogonal to them, and orthogonalises every
+    /// block against some of them.
+    pub(crate) fn new(columns: usize, deflated: Range<usize>) -> Loss {
         let unit = |k: usize| (0..=k).map(|i| if i == k { 1.0 } else { 0.0 }).collect();
-        let mut loss = Loss { deflated: deflated.map(unit).collect(), ..Loss::default() };
-        (loss.known.now, loss.unknown.now) = (vec![ZERO; columns], vec![ZERO; columns]);
-        loss
+        let nothing = || Omega(vec![vec![ZERO; columns]]);
+        Loss {
+            known: nothing(),
+            unknown: nothing(),
+            fresh: Vec::new(),
+            noise: 0.0,
+            deflated: deflated.map(unit).collect(),
+            correction: Vec::new(),
+            scale: 0.0,
+        }
     }
 
-    /// What the last block has in common with those before it: a row for each of their columns.
-    pub(crate) fn known(&self) -> &[Row] {
-        &self.known.now
+    /// What each block after those columns has in common with all before it, as far as known: a row for each column.
+    pub(crate) fn known(&self) -> &[Vec<Row>] {
+        &self.known.0
     }
 
     /// Every block is orthogonalised along these combinations of columns from now on.
@@ -133,7 +144,7 @@ impl Loss {
         random: &mut ChaCha8Rng,
     ) {
         let back = transpose(r_before);
-        let columns = self.known.now.len();
+        let columns = self.known.now().len();
         let mut known: Vec<Row> =
             (0..columns).map(|k| times(&self.known.row(k, projected, alpha, &back), inverse)).collect();
         let nothing = self.unknown.is_zero();
@@ -149,16 +160,18 @@ impl Loss {
             self.deflate_from(rows);
             rows.extend([ZERO; WIDTH]); // neighbours are orthogonalised explicitly
         }
-        self.known.push(known);
-        self.unknown.push(unknown);
+        self.known.0.push(known);
+        self.unknown.0.push(unknown);
     }
 
-    /// What the last block has in common with those before it was measured.
-    pub(crate) fn correct(&mut self, measured: Vec<Row>) -> &[Row] {
-        self.correction = std::mem::replace(&mut self.known.now, measured);
-        for (was, is) in self.correction.iter_mut().zip(&self.known.now) {
-            (0..WIDTH).for_each(|a| was[a] = is[a] - was[a]);
-        }
+    /// What the last block has in common with those before it was measured. Result: what was not known.
+    pub(crate) fn correct(&mut self, measured: &[Row]) -> &[Row] {
+        let known = self.known.0.last_mut().map_or(&mut [][..], |known| known);
+        let difference = |(was, is): (&mut Row, &Row)| {
+            let before = std::mem::replace(was, *is);
+            std::array::from_fn(|a| is[a] - before[a])
+        };
+        self.correction = known.iter_mut().zip(measured).map(difference).collect();
         &self.correction
     }
 
@@ -172,10 +185,10 @@ impl Loss {
         alpha: &Small,
         inverse: &Small,
     ) -> Vec<Row> {
-        let columns = self.known.now.len();
+        let columns = self.known.now().len();
         found.truncate(columns);
-        let correction = Omega { now: std::mem::take(&mut self.correction), before: Vec::new() };
-        if !correction.now.is_empty() {
+        let correction = Omega(vec![std::mem::take(&mut self.correction)]);
+        if !correction.now().is_empty() {
             for (k, row) in found.iter_mut().enumerate() {
                 add_scaled::<Plain>(row, -1.0, &correction.row(k, projected, alpha, &SMALL_ZERO));
             }
@@ -185,15 +198,16 @@ impl Loss {
         self.fresh = noise.iter().map(|row| row.iter().fold(0.0, |most, x| x.abs().max(most))).collect();
         let least = self.fresh.iter().copied().fold(f64::INFINITY, f64::min);
         self.fresh.resize(left.len(), if least.is_finite() { least } else { 0.0 });
-        self.unknown.push(vec![ZERO; left.len()]);
-        self.known.push(left.iter().map(|row| times(row, inverse)).collect());
+        self.unknown.0.push(vec![ZERO; left.len()]);
+        self.known.0.push(left.iter().map(|row| times(row, inverse)).collect());
         found
     }
 
     /// The new block is orthogonal to all before it, whatever was foreseen.
     pub(crate) fn clean(&mut self) {
-        self.known.now.fill(ZERO);
-        self.unknown.now.fill(ZERO);
+        for omega in [&mut self.known, &mut self.unknown] {
+            omega.0.last_mut().into_iter().for_each(|now| now.fill(ZERO));
+        }
     }
 
     /// Whether more than so much is to be expected after the next step, if that is like the last: of what is known, and of
@@ -209,11 +223,11 @@ impl Loss {
         let back = transpose(r);
         [&self.known, &self.unknown].iter().zip(allowed).any(|(omega, allowed)| {
             let largest = |rows: &[Row]| rows.as_flattened().iter().fold(0.0f64, |most, x| most.max(x.abs()));
-            if GROWTH_MAX * largest(&omega.now).max(largest(&omega.before)) < allowed {
+            if GROWTH_MAX * largest(omega.now()).max(largest(omega.before())) < allowed {
                 return false;
             }
             let mut rows: Vec<Row> =
-                (0..omega.now.len()).map(|k| times(&omega.row(k, projected, alpha, &back), inverse)).collect();
+                (0..omega.now().len()).map(|k| times(&omega.row(k, projected, alpha, &back), inverse)).collect();
             self.deflate_from(&mut rows);
             largest(&rows) > allowed
         })

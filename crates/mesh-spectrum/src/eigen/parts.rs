@@ -77,7 +77,7 @@ pub(crate) fn take_off(kind: Kind, blocks: &[&[Row]], c: &[Small], ws: &mut [&mu
     });
 }
 
-/// W += Σ_k Q_k C_k, then out_i = P_iᵀ W and, after them, Wᵀ W and, if there is a V, P_iᵀ V, in one pass.
+/// W −= Σ_k Q_k C_k, then out_i = P_iᵀ W and, after them, Wᵀ W and, if there is a V, P_iᵀ V, in one pass.
 pub(crate) fn recur(
     kind: Kind,
     q: &[&[Row]],
@@ -87,12 +87,13 @@ pub(crate) fn recur(
     v: Option<&[Row]>,
     out: &mut [Small],
 ) {
+    let minus: Vec<Small> = c.iter().map(negative).collect();
     let part = part(w.len());
     let one = |(number, w): (usize, &mut [Row])| {
         let rows = number * part..number * part + w.len();
         let mut out = vec![SMALL_ZERO; out.len()];
         let v = v.map_or(&[][..], |v| &v[rows.clone()]);
-        kernel::recur(kind, &of(q, &rows), c, w, &of(p, &rows), v, &mut out);
+        kernel::recur(kind, &of(q, &rows), &minus, w, &of(p, &rows), v, &mut out);
         out
     };
     sum(w.par_chunks_mut(part).enumerate().map(one).collect(), out);
