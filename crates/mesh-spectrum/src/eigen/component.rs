@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use crate::eigen::assemble::{Joined, assemble, check_counts};
 use crate::eigen::block::{Block, Pool, Row, WIDTH};
-use crate::eigen::chain::{Found, Span, blocks_needed, chain, slices_expected};
+use crate::eigen::chain::{Found, Span, blocks_needed, chain, lead, slices_expected};
 use crate::eigen::dense;
 use crate::eigen::factor::{Factor, Symbolic};
 use crate::eigen::kernel::Kind;
@@ -222,7 +222,7 @@ impl Component {
         progress: &Progress,
     ) -> Result<Pairs, Trouble> {
         let symbolic = self.symbolic.as_ref().expect("prepared");
-        let weyl = Weyl::through(self.area * self.unit, top, count as f64);
+        let weyl = Weyl::closed(self.area * self.unit, Some(self.rows())).through(top, count as f64);
         let spans = self.spans(weyl, top, count, (attempt, seed), progress)?;
         let norm = self.norm / self.unit;
         let tools = Tools { matrix: &self.matrix, levels: &self.levels, pool, kind, progress, top, tolerance, norm };
@@ -258,7 +258,7 @@ impl Component {
         Ok(Pairs { eigenvalues, vectors, places, residuals: Some(residuals), counts, dense: false })
     }
 
-    /// Chains of about equal length. Where they meet is a value at which the eigenvalues below have been counted.
+    /// Chains that take about equally long. Where they meet is a value at which the eigenvalues below have been counted.
     fn spans(
         &self,
         weyl: Weyl,
@@ -268,8 +268,10 @@ impl Component {
         progress: &Progress,
     ) -> Result<Vec<Span>, Trouble> {
         let chains = chains(count);
+        let lead = lead(self.rows());
+        let share = (count as f64 - lead) / chains as f64;
         let borders = (1..chains).into_par_iter().map(|i| {
-            let number = count as f64 * i as f64 / chains as f64 + 0.3 * attempt as f64;
+            let number = lead + share * i as f64 + 0.3 * attempt as f64;
             let mut at = weyl.inverse(number);
             for _ in 0..4 {
                 progress.go_on()?;

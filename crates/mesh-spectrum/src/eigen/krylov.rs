@@ -47,6 +47,9 @@ use crate::eigen::slice::Tools;
 /// which counts by its square, and of what is not.
 const LOSS_MAX: [f64; 2] = [1e-7, 1e-9];
 
+/// What of that may stay.
+const LEAVE: f64 = 1e-9;
+
 /// Blocks of Ritz vectors nearest to the shift that every block is made orthogonal to.
 const NEAREST: usize = 2;
 
@@ -395,20 +398,35 @@ impl<'a> Krylov<'a> {
             add(&mut c[last - 1], &transpose(&self.coupling));
         }
         c.push(alpha);
-        let mut measured = blocks.clone();
+        // What is foreseen to be next to nothing may stay: it is measured with the rest.
+        let bound = LEAVE * (0..WIDTH).map(|a| self.coupling[a][a]).fold(f64::INFINITY, f64::min);
+        let (taken, stays): (Vec<usize>, Vec<usize>) = (0..=last).partition(|&k| largest(&[c[k]]) > bound);
+        let off: Vec<Small> = taken.iter().map(|&k| c[k]).collect();
+        let off_count = off.len();
+        let order = [taken, stays].concat();
+        let mut measured: Vec<&[Row]> = order.iter().map(|&k| blocks[k]).collect();
         measured.extend(self.nearest.iter().map(|block| &block[..n]));
         // What the last block has in common with the others is known only if that was measured.
         let both = !self.measured;
-        let mut left = vec![SMALL_ZERO; measured.len() * if both { 2 } else { 1 } + 1];
-        parts::recur(kind, &blocks, &c, w, &measured, both.then_some(blocks[last]), &mut left);
-        let of_last = left.split_off(measured.len() + 1);
-        let mut square = left.pop().unwrap_or(SMALL_ZERO);
-        let of_last = both.then(|| of_last[..last].concat());
+        let mut products = vec![SMALL_ZERO; measured.len() * if both { 2 } else { 1 } + 1];
+        parts::recur(kind, &measured[..off.len()], &off, w, &measured, both.then_some(blocks[last]), &mut products);
+        let of_last = products.split_off(measured.len() + 1);
+        let mut square = products.pop().unwrap_or(SMALL_ZERO);
+        let mut left = products.clone();
+        order.iter().zip(&products).for_each(|(&k, product)| left[k] = *product);
+        let of_last = both.then(|| {
+            let mut ordered = of_last.clone();
+            order.iter().zip(&of_last).for_each(|(&k, product)| ordered[k] = *product);
+            ordered[..last].concat()
+        });
         let mut off = vec![left[last]];
         off.extend_from_slice(&left[self.nearest_kept.clone()]);
         off.extend(left.drain(blocks.len()..));
         add(&mut alpha, &left[last]);
-        let found = left.clone();
+        let mut found = left.clone();
+        for &k in &order[off_count..] {
+            add(&mut found[k], &negative(&c[k]));
+        }
         left[last] = SMALL_ZERO;
         let mut left = self.loss.deflated(&left);
         for _ in 0..3 {

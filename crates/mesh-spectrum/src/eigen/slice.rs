@@ -6,10 +6,12 @@ use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
-use crate::eigen::block::{Block, Pool, Row, WIDTH, ZERO};
+use crate::eigen::block::{Pool, Row, SMALL_ZERO, WIDTH, ZERO};
 use crate::eigen::factor::Factor;
+use crate::eigen::gram::larger;
 use crate::eigen::kernel::{self, Kind};
 use crate::eigen::krylov::{Handover, Krylov};
+use crate::eigen::parts;
 use crate::eigen::polish::{Levels, polish};
 use crate::eigen::projected::Ritz;
 use crate::eigen::seconds::Step;
@@ -42,6 +44,13 @@ impl Tools<'_> {
     /// rounding leaves.
     fn allowed(&self) -> f64 {
         (0.9 * self.tolerance * self.top).max(ROUNDING * self.norm)
+    }
+
+    /// ‖A x − λ x‖ of the vectors of a block.
+    fn residuals(&self, x: &[Row], eigenvalues: &Row) -> Row {
+        let mut squares = ZERO;
+        kernel::residual(self.kind, self.matrix, x, eigenvalues, &mut squares);
+        squares.map(f64::sqrt)
     }
 }
 
@@ -243,17 +252,97 @@ impl Slice<'_> {
     /// Result: ‖A x − λ x‖ of each.
     pub(crate) fn vectors(&self, tools: &Tools, into: &mut [&mut [Row]]) -> Result<Vec<f64>, Trouble> {
         self.space.vectors(&self.ritz, &self.chosen, into)?;
-        tools.progress.clock.time(Step::Vectors, || {
-            let n = tools.matrix.rows();
-            let blocks = into.par_iter_mut().zip(self.eigenvalues.par_chunks(WIDTH));
-            let residuals = blocks.map(|(block, eigenvalues)| {
-                let mut scratch = [tools.pool.take(n + 1), tools.pool.take(n + 1)];
-                let residuals = settle(tools, self.factor, block, eigenvalues, &mut scratch);
-                tools.pool.give(scratch);
-                residuals
-            });
-            Ok(residuals.collect::<Result<Vec<_>, Trouble>>()?.concat())
-        })
+        tools.progress.clock.time(Step::Vectors, || self.settle(tools, into))
+    }
+
+    /// Makes the residuals of vectors small, where they are not; returns them.
+    fn settle(&self, tools: &Tools, into: &mut [&mut [Row]]) -> Result<Vec<f64>, Trouble> {
+        let n = tools.matrix.rows();
+        let allowed = tools.allowed();
+        let shifts: Vec<Row> = self.eigenvalues.chunks(WIDTH).map(|chunk| filled(chunk, 0.0)).collect();
+        let mut residuals: Vec<Row> =
+            into.par_iter().zip(&shifts).map(|(x, shifts)| tools.residuals(x, shifts)).collect();
+        let mut remedies = REMEDIES.iter();
+        loop {
+            tools.progress.go_on()?;
+            let most = residuals.iter().map(largest).fold(0.0, larger);
+            if most <= allowed {
+                return Ok(residuals.concat()[..self.eigenvalues.len()].to_vec());
+            }
+            let Some(remedy) = remedies.next().filter(|_| most.is_finite()) else {
+                return Err(Trouble::Again(format!("residual {most:e}, {allowed:e} allowed")));
+            };
+            let scratch = || [tools.pool.take(n + 1), tools.pool.take(n + 1)];
+            if let Remedy::Purge = remedy {
+                // One after another, because each is purged of the others.
+                let [mut r, mut along] = scratch();
+                for b in 0..into.len() {
+                    if largest(&residuals[b]) <= allowed {
+                        continue;
+                    }
+                    tools.progress.go_on()?;
+                    let most = largest(&residuals[b]);
+                    self.purge(tools, b, into, [&mut r[..n], &mut along[..n]], &shifts[b]);
+                    residuals[b] = tools.residuals(into[b], &shifts[b]);
+                    if largest(&residuals[b]) > most {
+                        add(into[b], &along, 1.0); // what was measured is rounding
+                        residuals[b] = tools.residuals(into[b], &shifts[b]);
+                    }
+                }
+                tools.pool.give([r, along]);
+                continue;
+            }
+            let blocks = into.par_iter_mut().zip(&mut residuals).zip(&shifts);
+            blocks.filter(|((_, residuals), _)| largest(residuals) > allowed).try_for_each(
+                |((x, residuals), shifts)| {
+                    tools.progress.go_on()?;
+                    let mut scratch = scratch();
+                    match remedy {
+                        Remedy::Polish => {
+                            let levels = tools.levels.get_or_init(|| Levels::new(tools.matrix));
+                            let excess = largest(residuals) / (0.3 * allowed);
+                            let [x_of, y_of] = &mut scratch;
+                            *residuals = polish(tools.kind, levels, tools.norm, shifts, excess, x, [x_of, y_of]);
+                        }
+                        _ => {
+                            let most = largest(residuals);
+                            step(tools, self.factor, x, shifts, &mut scratch[0]);
+                            *residuals = tools.residuals(x, shifts);
+                            if largest(residuals) > WORSE_MAX * most {
+                                add(x, &scratch[0], 1.0); // the factor is worse than the vectors
+                                *residuals = tools.residuals(x, shifts);
+                            }
+                        }
+                    }
+                    tools.pool.give(scratch);
+                    Ok::<(), EigenError>(())
+                },
+            )?;
+        }
+    }
+
+    /// Takes out of the vectors of a block what they have of the others of the slice, ε_j = v_jᵀ (A − λ) x / (λ_j − λ).
+    /// `r` and `along` are scratch.
+    fn purge(&self, tools: &Tools, b: usize, into: &mut [&mut [Row]], [r, along]: [&mut [Row]; 2], shifts: &Row) {
+        let Tools { matrix, kind, top, .. } = *tools;
+        kernel::sparse(kind, matrix, into[b], r);
+        for (r, x) in r.iter_mut().zip(&*into[b]) {
+            (0..WIDTH).for_each(|k| r[k] -= shifts[k] * x[k]);
+        }
+        let others: Vec<&[Row]> = into.iter().map(|block| &block[..]).collect();
+        let mut c = vec![SMALL_ZERO; others.len()];
+        parts::gram(kind, &others, &[&*r], &mut c);
+        for (c, eigenvalues) in c.iter_mut().zip(self.eigenvalues.chunks(WIDTH)) {
+            for (row, eigenvalue) in c.iter_mut().zip(filled(eigenvalues, f64::NAN)) {
+                for k in 0..WIDTH {
+                    let gap = eigenvalue - shifts[k];
+                    // Within a cluster any combination will do; and some columns belong to no pair.
+                    row[k] = if gap.abs() > CUT_GAP * top { row[k] / gap } else { 0.0 };
+                }
+            }
+        }
+        parts::sum_of(kind, &others, &c, along);
+        add(into[b], along, -1.0);
     }
 
     /// What the slice started with, for another try.
@@ -272,51 +361,27 @@ impl Slice<'_> {
 /// eigenvalue lose.
 pub(crate) const ROUNDING: f64 = 8.0 * 4e-16;
 
-/// How often vectors are improved, at most: polished, and every second time by a step of inverse iteration.
-const IMPROVE_MAX: usize = 5;
+/// What makes the residuals of vectors smaller.
+#[derive(Debug, Clone, Copy)]
+enum Remedy {
+    /// A polynomial in A, against what lies at high frequencies: rounding.
+    Polish,
+    /// Pairs known already, against what a vector has of them.
+    Purge,
+    /// A step of inverse iteration, against what lies farther from the shift than the vector, whatever it is.
+    Step,
+}
 
-/// Makes the residuals of a block of vectors small, if they are not; returns them.
-fn settle(
-    tools: &Tools,
-    factor: &Factor,
-    block: &mut [Row],
-    eigenvalues: &[f64],
-    [x, y]: &mut [Block; 2],
-) -> Result<Vec<f64>, Trouble> {
-    let Tools { matrix, kind, norm, .. } = *tools;
-    let allowed = tools.allowed();
-    let mut shifts = ZERO;
-    shifts[..eigenvalues.len()].copy_from_slice(eigenvalues);
-    let measure = |block: &[Row]| {
-        let mut squares = ZERO;
-        kernel::residual(kind, matrix, block, &shifts, &mut squares);
-        squares.map(f64::sqrt)
-    };
-    let largest = |residuals: &Row| residuals.iter().fold(0.0, |most: f64, x| most.max(*x));
-    let mut residuals = measure(block);
-    let mut time = 0;
-    loop {
-        tools.progress.go_on()?;
-        let most = largest(&residuals);
-        if most <= allowed {
-            return Ok(residuals[..eigenvalues.len()].to_vec());
-        }
-        if time == IMPROVE_MAX || residuals.iter().any(|residual| residual.is_nan()) {
-            return Err(Trouble::Again(format!("residual {most:e}, {allowed:e} allowed")));
-        }
-        if time % 2 == 1 {
-            step(tools, factor, block, &shifts, x);
-            residuals = measure(block);
-            if largest(&residuals) >= most {
-                add(block, x, 1.0); // the factor is worse than the vectors
-                residuals = measure(block);
-            }
-        } else {
-            let levels = tools.levels.get_or_init(|| Levels::new(matrix));
-            residuals = polish(kind, levels, norm, &shifts, most / (0.3 * allowed), block, [x, y]);
-        }
-        time += 1;
-    }
+/// In the order in which they are tried, on the blocks that need one.
+const REMEDIES: [Remedy; 7] =
+    [Remedy::Polish, Remedy::Step, Remedy::Purge, Remedy::Polish, Remedy::Step, Remedy::Purge, Remedy::Polish];
+
+/// By how much a step may enlarge a residual, along pairs next to the shift, which a purge takes out again.
+const WORSE_MAX: f64 = 1.0;
+
+/// Eigenvalues of a block, filled up with something.
+pub(crate) fn filled(eigenvalues: &[f64], with: f64) -> Row {
+    std::array::from_fn(|k| eigenvalues.get(k).copied().unwrap_or(with))
 }
 
 /// x ← x − d with d = (A − σI)⁻¹ (A − λI) x, a step of inverse iteration: takes away what lies farther from the shift
@@ -330,6 +395,11 @@ fn step(tools: &Tools, factor: &Factor, x: &mut [Row], eigenvalues: &Row, d: &mu
     }
     kernel::solve(tools.kind, &factor.packed, d);
     add(x, d, -1.0);
+}
+
+/// The largest of a block's residuals; not a number, if one is not.
+fn largest(residuals: &Row) -> f64 {
+    residuals.iter().copied().fold(0.0, larger)
 }
 
 /// X += c Y.

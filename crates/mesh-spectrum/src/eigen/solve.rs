@@ -107,6 +107,53 @@ fn group<A: Arithmetic, const HIGH: usize>(values: &[Row], first: usize, x: &[Ro
     out
 }
 
+/// Calls a function for a triangle of so many rows, at most eight: a number that the compiler knows, so that all of them
+/// stay in registers.
+macro_rules! for_length {
+    ($length:expr, $name:ident::<$a:ident>($($arg:expr),*)) => {
+        match $length {
+            1 => $name::<$a, 1>($($arg),*),
+            2 => $name::<$a, 2>($($arg),*),
+            3 => $name::<$a, 3>($($arg),*),
+            4 => $name::<$a, 4>($($arg),*),
+            5 => $name::<$a, 5>($($arg),*),
+            6 => $name::<$a, 6>($($arg),*),
+            7 => $name::<$a, 7>($($arg),*),
+            _ => $name::<$a, 8>($($arg),*),
+        }
+    };
+}
+
+/// x ← T⁻¹ (x − known), T the unit lower triangle whose column j is `triangle[j]`.
+#[inline(always)]
+fn below_diagonal<A: Arithmetic, const N: usize>(triangle: &[Row], known: &Small, own: &mut [Row]) {
+    let mut x: [Row; N] = std::array::from_fn(|r| std::array::from_fn(|k| own[r][k] - known[r][k]));
+    for j in 0..N {
+        let solved = x[j];
+        for r in 0..N {
+            if r > j {
+                add_scaled::<A>(&mut x[r], -triangle[j][r], &solved);
+            }
+        }
+    }
+    own.copy_from_slice(&x);
+}
+
+/// x ← T⁻ᵀ (x − known).
+#[inline(always)]
+fn above_diagonal<A: Arithmetic, const N: usize>(triangle: &[Row], known: &Small, own: &mut [Row]) {
+    let mut x: [Row; N] = std::array::from_fn(|r| std::array::from_fn(|k| own[r][k] - known[r][k]));
+    for r in (0..N).rev() {
+        let solved = x[r];
+        for j in 0..N {
+            if j < r {
+                add_scaled::<A>(&mut x[j], -triangle[j][r], &solved);
+            }
+        }
+    }
+    own.copy_from_slice(&x);
+}
+
 /// L y = x for the columns of one supernode.
 #[inline(always)]
 fn forward<A: Arithmetic, const HIGH: usize>(factor: &Packed, s: &Supernode, x: &mut [Row]) {
@@ -118,17 +165,7 @@ fn forward<A: Arithmetic, const HIGH: usize>(factor: &Packed, s: &Supernode, x: 
         let rows = (s.width - WIDTH * g).min(WIDTH);
         let triangle = &factor.values[start + WIDTH * g..][..rows];
         let own = &mut own[WIDTH * g..][..rows];
-        for (own, known) in own.iter_mut().zip(&known) {
-            for k in 0..WIDTH {
-                own[k] -= known[k];
-            }
-        }
-        for j in 0..rows {
-            let (solved, rest) = own.split_at_mut(j + 1);
-            for (r, own) in rest.iter_mut().enumerate() {
-                add_scaled::<A>(own, -triangle[j][j + 1 + r], &solved[j]);
-            }
-        }
+        for_length!(rows, below_diagonal::<A>(triangle, &known, own));
     }
     let first = s.begin + s.width;
     for g in 0..s.groups {
@@ -162,17 +199,7 @@ fn backward<A: Arithmetic, const HIGH: usize>(factor: &Packed, s: &Supernode, x:
         }
         let triangle = &factor.values[s.diagonal_start(g) + WIDTH * g..][..columns];
         let own = &mut x[s.begin + WIDTH * g..][..columns];
-        for (own, known) in own.iter_mut().zip(&known) {
-            for k in 0..WIDTH {
-                own[k] -= known[k];
-            }
-        }
-        for j in (0..columns).rev() {
-            let (own, solved) = own.split_at_mut(j + 1);
-            for (r, solved) in solved.iter().enumerate() {
-                add_scaled::<A>(&mut own[j], -triangle[j][j + 1 + r], solved);
-            }
-        }
+        for_length!(columns, above_diagonal::<A>(triangle, &known, own));
     }
 }
 

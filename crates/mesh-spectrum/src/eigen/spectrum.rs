@@ -80,10 +80,11 @@ fn top(
         return Ok((top, below));
     }
     // Counting a few more costs as many pairs more; counting again costs a factorisation.
-    let enough = wanted..=(wanted + 4 + count / 40).min(dofs);
+    let enough = wanted..=(wanted + 4 + count / 125).min(dofs);
     let area: f64 = components.iter().map(|component| component.area).sum();
+    let law = Weyl::closed(area, Some(dofs));
     let (mut low, mut high) = (0.0, 2.0 * components.iter().map(|component| component.norm).fold(0.0, f64::max));
-    let mut at = Weyl::closed(area).inverse(wanted as f64).min(0.5 * high);
+    let mut at = law.inverse(wanted as f64).min(0.5 * high);
     for round in 0..200 {
         progress.go_on()?;
         let counts: Option<Vec<usize>> = components
@@ -108,7 +109,8 @@ fn top(
         } else {
             high = at
         }
-        let guess = Weyl::through(area, at, total as f64)
+        let guess = law
+            .through(at, total as f64)
             .inverse(*enough.start() as f64 + 0.5 * (*enough.end() - *enough.start()) as f64);
         at = if guess > low && guess < high && round < 8 { guess } else { 0.5 * (low + high) };
         if high - low < 1e-7 * high {

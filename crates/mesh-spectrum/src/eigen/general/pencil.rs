@@ -182,7 +182,7 @@ impl Pencil {
     /// meshes with slivers, P = A + sB, Q = B with s near that one gives 1/(λ + s), exact for the lowest.
     pub(super) fn solve_dense(&self, wanted: usize) -> Result<Pairs, EigenError> {
         let n = self.rows();
-        let s = Weyl::closed(self.area).inverse(wanted as f64);
+        let s = Weyl::closed(self.area, None).inverse(wanted as f64);
         let inverse = self.norm() > 1e6 * s;
         let mut c = Mat::<f64>::zeros(n, n);
         let mut p = Mat::<f64>::zeros(n, n);
