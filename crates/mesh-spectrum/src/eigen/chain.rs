@@ -16,7 +16,7 @@ use crate::eigen::weyl::Weyl;
 fn pairs_a_slice(rows: usize) -> usize {
     match rows {
         ..30_000 => 32,
-        30_000..300_000 => 40,
+        30_000..300_000 => 46,
         _ => 48,
     }
 }

@@ -172,10 +172,10 @@ impl Component {
         })
     }
 
-    /// The `count` pairs below `top` (1/ℓ²), known by inertia to be so many, in slices.
+    /// The `count` pairs below `top` (1/ℓ²), known by inertia to be so many, in slices, with residuals relative to `aim`.
     pub(crate) fn solve_sliced(
         &self,
-        top: f64,
+        (top, aim): (f64, f64),
         count: usize,
         tolerance: f64,
         seed: u64,
@@ -197,7 +197,14 @@ impl Component {
         let mut detail = String::new();
         for attempt in 0..4 {
             let seed = mix(seed, attempt);
-            match self.attempt(top / self.unit, count, tolerance, (attempt as usize, seed), (kind, pool), progress) {
+            match self.attempt(
+                (top / self.unit, aim / self.unit),
+                count,
+                tolerance,
+                (attempt as usize, seed),
+                (kind, pool),
+                progress,
+            ) {
                 Ok(mut pairs) => {
                     pairs.eigenvalues.iter_mut().for_each(|e| *e *= self.unit);
                     pairs.residuals.iter_mut().flatten().for_each(|residual| *residual *= self.unit);
@@ -214,7 +221,7 @@ impl Component {
     /// One attempt, everything in `unit`.
     fn attempt(
         &self,
-        top: f64,
+        (top, aim): (f64, f64),
         count: usize,
         tolerance: f64,
         (attempt, seed): (usize, u64),
@@ -225,7 +232,8 @@ impl Component {
         let weyl = Weyl::closed(self.area * self.unit, Some(self.rows())).through(top, count as f64);
         let spans = self.spans(weyl, top, count, (attempt, seed), progress)?;
         let norm = self.norm / self.unit;
-        let tools = Tools { matrix: &self.matrix, levels: &self.levels, pool, kind, progress, top, tolerance, norm };
+        let tools =
+            Tools { matrix: &self.matrix, levels: &self.levels, pool, kind, progress, top, aim, tolerance, norm };
 
         progress.expect_slices(spans.iter().map(|span| slices_expected(self.rows(), span.end - span.first)).sum());
 

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::eigen::block::{Row, WIDTH, ZERO};
 use crate::eigen::component::{Component, Pairs};
-use crate::eigen::gram::{Gram, larger};
+use crate::eigen::gram::{Gram, SMALL_MAX, couple, larger};
 use crate::eigen::kernel::{self, Kind};
 use crate::eigen::{EigenError, Orthogonality, Progress};
 
@@ -79,9 +79,15 @@ pub(crate) fn finish(
         if loss <= if pass == 0 { enough } else { enough.max(0.1 * allowed) } {
             break;
         }
-        let changed = gram.clean(&mut blocks, &places, above, kind, progress)?;
+        let couplings = gram.couplings(&places, above);
+        let changed = couple(&mut blocks, &couplings, kind, progress)?;
         changed.iter().for_each(|&i| touched[i] = true);
-        gram.renew(&changed, &blocks, kind, progress)?;
+        if orthogonality == Orthogonality::Standard && couplings.iter().all(|couplings| couplings.largest() < SMALL_MAX)
+        {
+            gram.follow(&couplings);
+        } else {
+            gram.renew(&changed, &blocks, kind, progress)?;
+        }
         loss = gram.loss(&places);
     }
     let scales: Vec<f64> = places.iter().map(|&place| 1.0 / gram.entry(place, place).sqrt()).collect();

@@ -5,7 +5,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use crate::eigen::block::{Row, SMALL_ZERO, Small, WIDTH, add, transpose};
-use crate::eigen::kernel::{self, Kind, PANEL};
+use crate::eigen::kernel::{self, Kind, PANEL, SingleRow, SingleSmall};
 use crate::eigen::parts::parts;
 use crate::eigen::{EigenError, Progress};
 
@@ -29,10 +29,11 @@ fn products(
     };
     let one = |rows: Range<usize>| {
         let mut sums = zero();
-        for first in rows.clone().step_by(PANEL) {
+        for first in rows.clone().step_by(PANEL / 2) {
             progress.go_on()?;
             // Rows of all blocks that stay in a core's cache while every block meets every other.
-            let panel: Vec<&[Row]> = blocks.iter().map(|block| &block[first..(first + PANEL).min(rows.end)]).collect();
+            let panel: Vec<&[Row]> =
+                blocks.iter().map(|block| &block[first..(first + PANEL / 2).min(rows.end)]).collect();
             for (&i, sum) in columns.iter().zip(&mut sums) {
                 let (own, end) = of(i);
                 kernel::gram(kind, &panel[..end], &panel[own], sum);
@@ -126,71 +127,139 @@ impl Gram {
         most
     }
 
-    /// V ← V (3 I − Vᵀ V) / 2 on vectors scaled to length 1, the first step of Löwdin's symmetric orthonormalisation,
-    /// for the entries above a bound. What is left is of the square of what was there. The null vector, the first,
-    /// stays as it is. Result: the blocks that have changed.
-    pub(crate) fn clean(
-        &self,
-        blocks: &mut [&mut [Row]],
-        places: &[usize],
-        above: f64,
-        kind: Kind,
-        progress: &Progress,
-    ) -> Result<Vec<usize>, EigenError> {
-        // V ← V + V C. Columns that belong to no pair are left alone.
-        let count = self.blocks;
-        let mut c = vec![SMALL_ZERO; count * count];
-        let mut coupled = vec![false; count * count];
-        let scales: Vec<f64> = places.iter().map(|&place| 1.0 / self.entry(place, place).sqrt()).collect();
-        let mut set = |from: usize, to: usize, value: f64| {
-            let at = to / WIDTH * count + from / WIDTH;
-            c[at][from % WIDTH][to % WIDTH] = value;
-            coupled[at] = true;
-        };
-        for (i, &b) in places.iter().enumerate() {
-            for (k, &a) in places[..i].iter().enumerate() {
-                let along = self.entry(a, b) * scales[i] * scales[k];
-                if along.abs() > above {
-                    let (to_low, to_high) = if k == 0 { (0.0, along) } else { (0.5 * along, 0.5 * along) };
-                    // The lengths of the stored vectors come in again.
-                    set(a, b, -to_high * scales[k] / scales[i]);
-                    if to_low != 0.0 {
-                        set(b, a, -to_low * scales[i] / scales[k]);
+    /// The C with which V + V C is V (3 I − VᵀV) / 2 on vectors scaled to length 1, the first step of Löwdin's symmetric
+    /// orthonormalisation, for the entries above a bound. What is left is of the square of what was there. The null
+    /// vector, the first, stays as it is; columns that belong to no pair are left alone.
+    pub(crate) fn couplings(&self, places: &[usize], above: f64) -> Vec<Couplings> {
+        let side = WIDTH * self.blocks;
+        let mut scales = vec![0.0; side];
+        places.iter().for_each(|&place| scales[place] = 1.0 / self.entry(place, place).sqrt());
+        let null = places.first().copied();
+        let of_pair = |pair: usize| {
+            let mut c = vec![[[0.0; 2 * WIDTH]; WIDTH]; self.blocks];
+            let mut coupled = vec![false; self.blocks];
+            let own = 2 * WIDTH * pair..(2 * WIDTH * (pair + 1)).min(side);
+            for to in own.filter(|&to| scales[to] > 0.0 && Some(to) != null) {
+                for from in (0..side).filter(|&from| from != to) {
+                    let along = self.entry(from, to) * scales[to] * scales[from];
+                    if along.abs() > above {
+                        let share = if Some(from) == null { 1.0 } else { 0.5 };
+                        // The lengths of the stored vectors come in again.
+                        c[from / WIDTH][from % WIDTH][to % (2 * WIDTH)] =
+                            (-share * along * scales[from] / scales[to]) as f32;
+                        coupled[from / WIDTH] = true;
                     }
                 }
             }
-        }
-        // Two blocks at a time, from the blocks that either is coupled to.
-        let jobs: Vec<(Vec<usize>, Vec<Small>)> = coupled
-            .chunks(2 * count)
-            .zip(c.chunks(2 * count))
-            .map(|(coupled, c)| {
-                let from: Vec<usize> = (0..count).filter(|k| coupled[*k..].iter().step_by(count).any(|x| *x)).collect();
-                let c = c.chunks(count).flat_map(|c| from.iter().map(|&k| c[k])).collect();
-                (from, c)
-            })
-            .collect();
-        drop(c);
-        let mut needed = vec![false; count];
-        jobs.iter().flat_map(|(from, _)| from).for_each(|&k| needed[k] = true);
-        let n = blocks[0].len();
-        let mut panels: Vec<Vec<&mut [Row]>> = (0..n.div_ceil(PANEL / 4)).map(|_| Vec::new()).collect();
-        for block in blocks {
-            block.chunks_mut(PANEL / 4).zip(&mut panels).for_each(|(rows, panel)| panel.push(rows));
-        }
-        panels.par_iter_mut().try_for_each(|panel| {
-            progress.go_on()?;
-            let before: Vec<Vec<Row>> = panel
-                .iter()
-                .zip(&needed)
-                .map(|(rows, needed)| if *needed { rows.to_vec() } else { Vec::new() })
-                .collect();
-            for (own, (from, c)) in panel.chunks_mut(2).zip(&jobs).filter(|(_, (from, _))| !from.is_empty()) {
-                let from: Vec<&[Row]> = from.iter().map(|&k| &before[k][..]).collect();
-                kernel::update(kind, &from, c, own, true);
-            }
-            Ok(())
-        })?;
-        Ok((0..count).filter(|&i| !jobs[i / 2].0.is_empty()).collect())
+            let from: Vec<usize> = (0..self.blocks).filter(|&k| coupled[k]).collect();
+            let c = from.iter().map(|&k| c[k]).collect();
+            Couplings { pair, from, c }
+        };
+        (0..self.blocks.div_ceil(2)).into_par_iter().map(of_pair).collect()
     }
+
+    /// (I + C)ᵀ VᵀV (I + C), what VᵀV becomes, from what was measured before: exact to rounding.
+    pub(crate) fn follow(&mut self, couplings: &[Couplings]) {
+        let side = WIDTH * self.blocks;
+        let mut full: Vec<Vec<f64>> = (0..side).map(|b| (0..side).map(|a| self.entry(a, b)).collect()).collect();
+        let entries: Vec<(usize, usize, f64)> = couplings.iter().flat_map(Couplings::entries).collect();
+        let before = full.clone();
+        for &(from, to, value) in &entries {
+            full[to].iter_mut().zip(&before[from]).for_each(|(to, from)| *to += value * from);
+        }
+        for column in &mut full {
+            let before = column.clone();
+            entries.iter().for_each(|&(from, to, value)| column[to] += value * before[from]);
+        }
+        for i in 0..self.blocks {
+            for k in 0..=i {
+                self.parts[i * (i + 1) / 2 + k] =
+                    std::array::from_fn(|a| std::array::from_fn(|c| full[WIDTH * i + c][WIDTH * k + a]));
+            }
+        }
+    }
+}
+
+/// What two neighbouring blocks are to get of others: the columns of a matrix C that V is to be multiplied with.
+pub(crate) struct Couplings {
+    /// The number of the two blocks, in twos.
+    pair: usize,
+    /// The others, and for each its part of C.
+    from: Vec<usize>,
+    c: Vec<SingleSmall>,
+}
+
+impl Couplings {
+    /// The largest entry.
+    pub(crate) fn largest(&self) -> f64 {
+        f64::from(self.c.as_flattened().as_flattened().iter().fold(0.0f32, |most, x| most.max(x.abs())))
+    }
+
+    /// From which column to which, and how much.
+    fn entries(&self) -> impl Iterator<Item = (usize, usize, f64)> {
+        self.from.iter().zip(&self.c).flat_map(move |(&from, c)| {
+            c.iter().enumerate().flat_map(move |(a, row)| {
+                let nonzero = row.iter().enumerate().filter(|(_, value)| **value != 0.0);
+                nonzero.map(move |(k, &value)| (WIDTH * from + a, 2 * WIDTH * self.pair + k, f64::from(value)))
+            })
+        })
+    }
+
+    /// The blocks that something is added to.
+    fn changed(&self) -> Vec<usize> {
+        let mut changed: Vec<usize> = self.entries().map(|(_, to, _)| to / WIDTH).collect();
+        changed.sort_unstable();
+        changed.dedup();
+        changed
+    }
+}
+
+/// Couplings below this are added in single precision: what that rounds off, 6e-8 of them, is multiplied by ‖A‖/λ_K in the
+/// residual, and leaves inner products that are known to 1e-15 without being measured again.
+pub(crate) const SMALL_MAX: f64 = 1e-8;
+
+/// V ← V + V C. Result: the blocks that have changed.
+pub(crate) fn couple(
+    blocks: &mut [&mut [Row]],
+    couplings: &[Couplings],
+    kind: Kind,
+    progress: &Progress,
+) -> Result<Vec<usize>, EigenError> {
+    let small = couplings.iter().all(|couplings| couplings.largest() < SMALL_MAX);
+    let mut needed = vec![false; blocks.len()];
+    couplings.iter().flat_map(|couplings| &couplings.from).for_each(|&k| needed[k] = true);
+    let n = blocks[0].len();
+    let mut panels: Vec<Vec<&mut [Row]>> = (0..n.div_ceil(PANEL / 4)).map(|_| Vec::new()).collect();
+    for block in blocks {
+        block.chunks_mut(PANEL / 4).zip(&mut panels).for_each(|(rows, panel)| panel.push(rows));
+    }
+    panels.par_iter_mut().try_for_each(|panel| {
+        progress.go_on()?;
+        if small {
+            let before = copies(panel, &needed, |row| row.map(|x| x as f32));
+            for (own, Couplings { from, c, .. }) in panel.chunks_mut(2).zip(couplings) {
+                let from: Vec<&[SingleRow]> = from.iter().map(|&k| &before[k][..]).collect();
+                kernel::correct(kind, &from, c, own);
+            }
+        } else {
+            let before = copies(panel, &needed, |row| *row);
+            for (own, Couplings { from, c, .. }) in panel.chunks_mut(2).zip(couplings) {
+                let from: Vec<&[Row]> = from.iter().map(|&k| &before[k][..]).collect();
+                for (own, half) in own.iter_mut().zip([0, WIDTH]) {
+                    let half = |row: &[f32; 2 * WIDTH]| std::array::from_fn(|k| f64::from(row[half + k]));
+                    let c: Vec<Small> = c.iter().map(|c| c.each_ref().map(half)).collect();
+                    kernel::update(kind, &from, &c, &mut [own], true);
+                }
+            }
+        }
+        Ok(())
+    })?;
+    Ok(couplings.iter().flat_map(Couplings::changed).collect())
+}
+
+/// Copies of those blocks of a panel that are needed.
+fn copies<T>(panel: &[&mut [Row]], needed: &[bool], copy: impl Fn(&Row) -> T) -> Vec<Vec<T>> {
+    let of_block =
+        |(rows, needed): (&&mut [Row], &bool)| if *needed { rows.iter().map(&copy).collect() } else { Vec::new() };
+    panel.iter().zip(needed).map(of_block).collect()
 }

@@ -649,6 +649,7 @@ mod tests {
             kind: Kind::best(),
             progress: &progress,
             top: 0.2,
+            aim: 0.2,
             tolerance: 1e-10,
             norm: 4.0,
         };

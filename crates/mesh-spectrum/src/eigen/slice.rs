@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 
 use rayon::prelude::*;
 
-use crate::eigen::block::{Pool, Row, SMALL_ZERO, WIDTH, ZERO};
+use crate::eigen::block::{Block, Pool, Row, SMALL_ZERO, WIDTH, ZERO};
 use crate::eigen::factor::Factor;
 use crate::eigen::gram::larger;
 use crate::eigen::kernel::{self, Kind};
@@ -31,19 +31,20 @@ pub(crate) struct Tools<'a> {
     pub(crate) pool: &'a Pool,
     pub(crate) kind: Kind,
     pub(crate) progress: &'a Progress<'a>,
-    /// The upper end of the whole range, λ_K or a little more: residuals are relative to it.
+    /// The upper end of the whole range, λ_K or a little more.
     pub(crate) top: f64,
-    /// The residual allowed, relative to `top`.
+    /// λ_K or a little less: residuals are relative to it.
+    pub(crate) aim: f64,
+    /// The residual allowed, relative to `aim`.
     pub(crate) tolerance: f64,
     /// An upper bound of A's largest eigenvalue.
     pub(crate) norm: f64,
 }
 
 impl Tools<'_> {
-    /// The residual that vectors are left with: a tenth in hand, because λ_K lies a little below the top, and no less than
-    /// rounding leaves.
+    /// The residual that vectors are left with: a little in hand for what cleaning adds, and no less than rounding leaves.
     fn allowed(&self) -> f64 {
-        (0.9 * self.tolerance * self.top).max(ROUNDING * self.norm)
+        (0.9 * self.tolerance * self.aim).max(ROUNDING * self.norm)
     }
 
     /// ‖A x − λ x‖ of the vectors of a block.
@@ -263,10 +264,12 @@ impl Slice<'_> {
         let mut residuals: Vec<Row> =
             into.par_iter().zip(&shifts).map(|(x, shifts)| tools.residuals(x, shifts)).collect();
         let mut remedies = REMEDIES.iter();
+        let mut beyond: Vec<Block> = Vec::new();
         loop {
             tools.progress.go_on()?;
             let most = residuals.iter().map(largest).fold(0.0, larger);
             if most <= allowed {
+                tools.pool.give(beyond);
                 return Ok(residuals.concat()[..self.eigenvalues.len()].to_vec());
             }
             let Some(remedy) = remedies.next().filter(|_| most.is_finite()) else {
@@ -274,6 +277,11 @@ impl Slice<'_> {
             };
             let scratch = || [tools.pool.take(n + 1), tools.pool.take(n + 1)];
             if let Remedy::Purge = remedy {
+                if beyond.is_empty() {
+                    beyond.resize_with(BEYOND, || tools.pool.take(n + 1));
+                    let mut into: Vec<&mut [Row]> = beyond.iter_mut().map(|x| &mut x[..n]).collect();
+                    self.space.vectors(&self.ritz, &self.beyond[..self.beyond.len().min(WIDTH * BEYOND)], &mut into)?;
+                }
                 // One after another, because each is purged of the others.
                 let [mut r, mut along] = scratch();
                 for b in 0..into.len() {
@@ -282,7 +290,7 @@ impl Slice<'_> {
                     }
                     tools.progress.go_on()?;
                     let most = largest(&residuals[b]);
-                    self.purge(tools, b, into, [&mut r[..n], &mut along[..n]], &shifts[b]);
+                    self.purge(tools, b, into, &beyond, [&mut r[..n], &mut along[..n]], &shifts[b]);
                     residuals[b] = tools.residuals(into[b], &shifts[b]);
                     if largest(&residuals[b]) > most {
                         add(into[b], &along, 1.0); // what was measured is rounding
@@ -323,16 +331,28 @@ impl Slice<'_> {
 
     /// Takes out of the vectors of a block what they have of the others of the slice, ε_j = v_jᵀ (A − λ) x / (λ_j − λ).
     /// `r` and `along` are scratch.
-    fn purge(&self, tools: &Tools, b: usize, into: &mut [&mut [Row]], [r, along]: [&mut [Row]; 2], shifts: &Row) {
+    fn purge(
+        &self,
+        tools: &Tools,
+        b: usize,
+        into: &mut [&mut [Row]],
+        beyond: &[Block],
+        [r, along]: [&mut [Row]; 2],
+        shifts: &Row,
+    ) {
         let Tools { matrix, kind, top, .. } = *tools;
         kernel::sparse(kind, matrix, into[b], r);
         for (r, x) in r.iter_mut().zip(&*into[b]) {
             (0..WIDTH).for_each(|k| r[k] -= shifts[k] * x[k]);
         }
-        let others: Vec<&[Row]> = into.iter().map(|block| &block[..]).collect();
+        let mut others: Vec<&[Row]> = into.iter().map(|block| &block[..]).collect();
+        others.extend(beyond.iter().map(|block| &block[..r.len()]));
         let mut c = vec![SMALL_ZERO; others.len()];
         parts::gram(kind, &others, &[&*r], &mut c);
-        for (c, eigenvalues) in c.iter_mut().zip(self.eigenvalues.chunks(WIDTH)) {
+        let ahead = self.ahead();
+        let ahead = &ahead[..ahead.len().min(WIDTH * beyond.len())];
+        let eigenvalues = self.eigenvalues.chunks(WIDTH).chain(ahead.chunks(WIDTH));
+        for (c, eigenvalues) in c.iter_mut().zip(eigenvalues) {
             for (row, eigenvalue) in c.iter_mut().zip(filled(eigenvalues, f64::NAN)) {
                 for k in 0..WIDTH {
                     let gap = eigenvalue - shifts[k];
@@ -372,15 +392,19 @@ enum Remedy {
     Step,
 }
 
+/// Blocks of the pairs above a slice that its vectors are purged of, too: farther vectors of the slice have most of what
+/// lies between them and the shift.
+const BEYOND: usize = 4;
+
 /// In the order in which they are tried, on the blocks that need one.
 const REMEDIES: [Remedy; 7] =
     [Remedy::Polish, Remedy::Step, Remedy::Purge, Remedy::Polish, Remedy::Step, Remedy::Purge, Remedy::Polish];
 
 /// By how much a step may enlarge a residual, along pairs next to the shift, which a purge takes out again.
-const WORSE_MAX: f64 = 1.0;
+const WORSE_MAX: f64 = 10.0;
 
 /// Eigenvalues of a block, filled up with something.
-pub(crate) fn filled(eigenvalues: &[f64], with: f64) -> Row {
+fn filled(eigenvalues: &[f64], with: f64) -> Row {
     std::array::from_fn(|k| eigenvalues.get(k).copied().unwrap_or(with))
 }
 

@@ -31,6 +31,7 @@ pub(crate) fn lowest(
         .map(|(component, dense)| dense.then(|| solve_dense(component)).transpose())
         .collect::<Result<_, _>>()?;
     let (top, below) = top(components, &solved, count, progress)?;
+    let aim = aim(components, top, below.iter().sum(), count);
     components
         .par_iter()
         .zip(&mut solved)
@@ -51,10 +52,22 @@ pub(crate) fn lowest(
             None => {
                 // Components are of different sizes, so each has blocks of its own.
                 let tools = (kind, &Pool::default());
-                component.solve_sliced(top, below, tolerance, mix(seed, number as u64), tools, progress)
+                component.solve_sliced((top, aim), below, tolerance, mix(seed, number as u64), tools, progress)
             }
         })
         .collect()
+}
+
+/// The share of what Weyl's law says λ_K is below a value with a known count that λ_K is taken to be: it varies by a pair or
+/// two.
+const AIM: f64 = 0.98;
+
+/// About λ_K, which residuals are relative to, and rather less than more.
+fn aim(components: &[Component], top: f64, total: usize, count: usize) -> f64 {
+    let area = components.iter().map(|component| component.area).sum();
+    let dofs = components.iter().map(Component::rows).sum();
+    let last = Weyl::closed(area, Some(dofs)).through(top, total as f64).inverse(count as f64);
+    if last < top { AIM * last } else { top }
 }
 
 /// A value with at least count + 1 eigenvalues of all components below it, not many more, and how many of each.
