@@ -11,13 +11,13 @@ use crate::eigen::krylov::Handover;
 use crate::eigen::slice::{CUT_GAP, Demand, Failure, Tools, Trouble, slice};
 use crate::eigen::weyl::Weyl;
 
-/// Pairs of a slice. Fewer: more factorisations, which cost more beside a solve the larger the mesh; more: a longer way
-/// from shift to shift, by the square of which errors of the vectors handed over are multiplied.
+/// Pairs of a slice. Fewer: more factorisations; more: a longer way from shift to shift, by the square of which errors of
+/// the vectors handed over are multiplied, and with a million vertices every vector then needs more than polishing.
 fn pairs_a_slice(rows: usize) -> usize {
     match rows {
         ..30_000 => 32,
         30_000..300_000 => 46,
-        _ => 48,
+        _ => 40,
     }
 }
 

@@ -207,9 +207,27 @@ fn add_update(update: &[f64], places: &[u32], front: &mut [f64], side: usize) {
     let below = places.len();
     for (j, column) in update.chunks_exact(below.max(1)).enumerate() {
         let to = &mut front[places[j] as usize * side..][..side];
-        for (value, &place) in column[j..].iter().zip(&places[j..]) {
-            to[place as usize] += value;
+        let first = j.next_multiple_of(WIDTH).min(below);
+        add_at(to, &column[j..first], &places[j..first]);
+        for (values, places) in
+            column[first..].as_chunks::<WIDTH>().0.iter().zip(places[first..].as_chunks::<WIDTH>().0)
+        {
+            let start = places[0] as usize;
+            match to.get_mut(start..start + WIDTH) {
+                // Rows of a child are mostly neighbours in its parent, too.
+                Some(to) if places[WIDTH - 1] as usize == start + WIDTH - 1 => {
+                    to.iter_mut().zip(values).for_each(|(to, value)| *to += value);
+                }
+                _ => add_at(to, values, places),
+            }
         }
+    }
+}
+
+#[inline(always)]
+fn add_at(to: &mut [f64], values: &[f64], places: &[u32]) {
+    for (value, &place) in values.iter().zip(places) {
+        to[place as usize] += value;
     }
 }
 

@@ -47,7 +47,8 @@ use crate::eigen::slice::Tools;
 /// which counts by its square, and of what is not.
 const LOSS_MAX: [f64; 2] = [1e-7, 1e-9];
 
-/// What of that may stay.
+/// What is foreseen of a loss, beside the length of the block, if it is not to be taken off: a step multiplies it by up to
+/// 200, and it is known.
 const LEAVE: f64 = 1e-9;
 
 /// Blocks of Ritz vectors nearest to the shift that every block is made orthogonal to.
@@ -402,8 +403,7 @@ impl<'a> Krylov<'a> {
         let bound = LEAVE * (0..WIDTH).map(|a| self.coupling[a][a]).fold(f64::INFINITY, f64::min);
         let (taken, stays): (Vec<usize>, Vec<usize>) = (0..=last).partition(|&k| largest(&[c[k]]) > bound);
         let off: Vec<Small> = taken.iter().map(|&k| c[k]).collect();
-        let off_count = off.len();
-        let order = [taken, stays].concat();
+        let order = [&taken[..], &stays].concat();
         let mut measured: Vec<&[Row]> = order.iter().map(|&k| blocks[k]).collect();
         measured.extend(self.nearest.iter().map(|block| &block[..n]));
         // What the last block has in common with the others is known only if that was measured.
@@ -412,21 +412,14 @@ impl<'a> Krylov<'a> {
         parts::recur(kind, &measured[..off.len()], &off, w, &measured, both.then_some(blocks[last]), &mut products);
         let of_last = products.split_off(measured.len() + 1);
         let mut square = products.pop().unwrap_or(SMALL_ZERO);
-        let mut left = products.clone();
-        order.iter().zip(&products).for_each(|(&k, product)| left[k] = *product);
-        let of_last = both.then(|| {
-            let mut ordered = of_last.clone();
-            order.iter().zip(&of_last).for_each(|(&k, product)| ordered[k] = *product);
-            ordered[..last].concat()
-        });
+        let mut left = back_in_order(&products, &order);
+        let of_last = both.then(|| back_in_order(&of_last, &order)[..last].concat());
         let mut off = vec![left[last]];
         off.extend_from_slice(&left[self.nearest_kept.clone()]);
         off.extend(left.drain(blocks.len()..));
         add(&mut alpha, &left[last]);
         let mut found = left.clone();
-        for &k in &order[off_count..] {
-            add(&mut found[k], &negative(&c[k]));
-        }
+        stays.iter().for_each(|&k| add(&mut found[k], &negative(&c[k])));
         left[last] = SMALL_ZERO;
         let mut left = self.loss.deflated(&left);
         for _ in 0..3 {
@@ -603,6 +596,13 @@ impl Drop for Krylov<'_> {
     fn drop(&mut self) {
         self.tools.pool.give(self.basis.drain(..).chain(self.nearest.drain(..)).chain(self.ahead.take()));
     }
+}
+
+/// Products that were computed in another order of the blocks; those after them stay where they are.
+fn back_in_order(products: &[Small], order: &[usize]) -> Vec<Small> {
+    let mut ordered = products.to_vec();
+    order.iter().zip(products).for_each(|(&k, product)| ordered[k] = *product);
+    ordered
 }
 
 fn dot(a: &Row, b: &Row) -> f64 {
