@@ -263,3 +263,46 @@ fn copies<T>(panel: &[&mut [Row]], needed: &[bool], copy: impl Fn(&Row) -> T) ->
         |(rows, needed): (&&mut [Row], &bool)| if *needed { rows.iter().map(&copy).collect() } else { Vec::new() };
     panel.iter().zip(needed).map(of_block).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::eigen::kernel::tests::block;
+
+    /// Unit vectors, each with so much of something else.
+    fn nearly_orthonormal(share: f64) -> Vec<Vec<Row>> {
+        let mut blocks: Vec<Vec<Row>> = (0..3).map(|seed| block(1000, seed)).collect();
+        for (b, block) in blocks.iter_mut().enumerate() {
+            block.iter_mut().flatten().for_each(|x| *x *= share);
+            (0..WIDTH).for_each(|k| block[40 * (WIDTH * b + k)][k] += 1.0);
+        }
+        blocks
+    }
+
+    #[test]
+    fn what_is_coupled_is_orthonormal_and_known_to_be() {
+        let progress = Progress::new(&(), 0);
+        let kind = Kind::best();
+        let places: Vec<usize> = (0..24).filter(|place| *place != 13).collect(); // a column that belongs to no pair
+        // In single precision, and in double.
+        for (share, left) in [(1e-9, 1e-15), (1e-5, 1e-8)] {
+            let mut blocks = nearly_orthonormal(share);
+            let mut blocks: Vec<&mut [Row]> = blocks.iter_mut().map(|block| &mut block[..]).collect();
+            let mut gram = Gram::of(&blocks, kind, &progress).unwrap();
+            assert!(gram.loss(&places) > 0.1 * share);
+            let null: Vec<f64> = blocks[0].iter().map(|row| row[0]).collect();
+            let couplings = gram.couplings(&places, 0.0);
+            assert_eq!(couplings.iter().all(|couplings| couplings.largest() < SMALL_MAX), share < 1e-8);
+            assert_eq!(couple(&mut blocks, &couplings, kind, &progress).unwrap(), [0, 1, 2]);
+            gram.follow(&couplings);
+            let measured = Gram::of(&blocks, kind, &progress).unwrap();
+            assert!(measured.loss(&places) < left, "the square of what there was, or rounding");
+            for a in 0..24 {
+                for b in 0..=a {
+                    assert!((gram.entry(a, b) - measured.entry(a, b)).abs() < 1e-14, "rounding of sums below 2");
+                }
+            }
+            assert!(null.iter().zip(blocks[0].iter()).all(|(null, row)| *null == row[0]), "the null vector stays");
+        }
+    }
+}

@@ -275,78 +275,77 @@ impl Slice<'_> {
             let Some(remedy) = remedies.next().filter(|_| most.is_finite()) else {
                 return Err(Trouble::Again(format!("residual {most:e}, {allowed:e} allowed")));
             };
-            let scratch = || [tools.pool.take(n + 1), tools.pool.take(n + 1)];
             if let Remedy::Purge = remedy {
                 if beyond.is_empty() {
-                    beyond.resize_with(BEYOND, || tools.pool.take(n + 1));
+                    let next = &self.beyond[..self.beyond.len().min(WIDTH * BEYOND)];
+                    beyond.resize_with(next.len().div_ceil(WIDTH), || tools.pool.take(n + 1));
                     let mut into: Vec<&mut [Row]> = beyond.iter_mut().map(|x| &mut x[..n]).collect();
-                    self.space.vectors(&self.ritz, &self.beyond[..self.beyond.len().min(WIDTH * BEYOND)], &mut into)?;
+                    self.space.vectors(&self.ritz, next, &mut into)?;
                 }
                 // One after another, because each is purged of the others.
-                let [mut r, mut along] = scratch();
                 for b in 0..into.len() {
-                    if largest(&residuals[b]) <= allowed {
-                        continue;
-                    }
-                    tools.progress.go_on()?;
-                    let most = largest(&residuals[b]);
-                    self.purge(tools, b, into, &beyond, [&mut r[..n], &mut along[..n]], &shifts[b]);
-                    residuals[b] = tools.residuals(into[b], &shifts[b]);
-                    if largest(&residuals[b]) > most {
-                        add(into[b], &along, 1.0); // what was measured is rounding
-                        residuals[b] = tools.residuals(into[b], &shifts[b]);
+                    if largest(&residuals[b]) > allowed {
+                        tools.progress.go_on()?;
+                        residuals[b] = self.purge(tools, b, into, &beyond, &shifts[b], &residuals[b]);
                     }
                 }
-                tools.pool.give([r, along]);
                 continue;
             }
             let blocks = into.par_iter_mut().zip(&mut residuals).zip(&shifts);
             blocks.filter(|((_, residuals), _)| largest(residuals) > allowed).try_for_each(
                 |((x, residuals), shifts)| {
                     tools.progress.go_on()?;
-                    let mut scratch = scratch();
-                    match remedy {
-                        Remedy::Polish => {
-                            let levels = tools.levels.get_or_init(|| Levels::new(tools.matrix));
-                            let excess = largest(residuals) / (0.3 * allowed);
-                            let [x_of, y_of] = &mut scratch;
-                            *residuals = polish(tools.kind, levels, tools.norm, shifts, excess, x, [x_of, y_of]);
-                        }
-                        _ => {
-                            let most = largest(residuals);
-                            step(tools, self.factor, x, shifts, &mut scratch[0]);
-                            *residuals = tools.residuals(x, shifts);
-                            if largest(residuals) > WORSE_MAX * most {
-                                add(x, &scratch[0], 1.0); // the factor is worse than the vectors
-                                *residuals = tools.residuals(x, shifts);
-                            }
-                        }
-                    }
-                    tools.pool.give(scratch);
+                    *residuals = self.improve(tools, *remedy, x, shifts, residuals);
                     Ok::<(), EigenError>(())
                 },
             )?;
         }
     }
 
-    /// Takes out of the vectors of a block what they have of the others of the slice, ε_j = v_jᵀ (A − λ) x / (λ_j − λ).
-    /// `r` and `along` are scratch.
+    /// Polishes the vectors of a block, or does a step of inverse iteration. Result: their residuals.
+    fn improve(&self, tools: &Tools, remedy: Remedy, x: &mut [Row], shifts: &Row, residuals: &Row) -> Row {
+        let n = tools.matrix.rows();
+        let most = largest(residuals);
+        let mut scratch = [tools.pool.take(n + 1), tools.pool.take(n + 1)];
+        let residuals = if let Remedy::Polish = remedy {
+            let levels = tools.levels.get_or_init(|| Levels::new(tools.matrix));
+            let [first, second] = &mut scratch;
+            polish(tools.kind, levels, tools.norm, shifts, most / (0.3 * tools.allowed()), x, [first, second])
+        } else {
+            step(tools, self.factor, x, shifts, &mut scratch[0]);
+            let after = tools.residuals(x, shifts);
+            if largest(&after) > WORSE_MAX * most {
+                add(x, &scratch[0], 1.0); // the factor is worse than the vectors
+                tools.residuals(x, shifts)
+            } else {
+                after
+            }
+        };
+        tools.pool.give(scratch);
+        residuals
+    }
+
+    /// Takes out of the vectors of a block what they have of the others of the slice, and of those above it,
+    /// ε_j = v_jᵀ (A − λ) x / (λ_j − λ). Result: their residuals.
     fn purge(
         &self,
         tools: &Tools,
         b: usize,
         into: &mut [&mut [Row]],
         beyond: &[Block],
-        [r, along]: [&mut [Row]; 2],
         shifts: &Row,
-    ) {
+        residuals: &Row,
+    ) -> Row {
         let Tools { matrix, kind, top, .. } = *tools;
+        let n = matrix.rows();
+        let mut scratch = [tools.pool.take(n + 1), tools.pool.take(n + 1)];
+        let [r, along] = scratch.each_mut().map(|block| &mut block[..n]);
         kernel::sparse(kind, matrix, into[b], r);
         for (r, x) in r.iter_mut().zip(&*into[b]) {
             (0..WIDTH).for_each(|k| r[k] -= shifts[k] * x[k]);
         }
         let mut others: Vec<&[Row]> = into.iter().map(|block| &block[..]).collect();
-        others.extend(beyond.iter().map(|block| &block[..r.len()]));
+        others.extend(beyond.iter().map(|block| &block[..n]));
         let mut c = vec![SMALL_ZERO; others.len()];
         parts::gram(kind, &others, &[&*r], &mut c);
         let ahead = self.ahead();
@@ -363,6 +362,13 @@ impl Slice<'_> {
         }
         parts::sum_of(kind, &others, &c, along);
         add(into[b], along, -1.0);
+        let mut after = tools.residuals(into[b], shifts);
+        if largest(&after) > largest(residuals) {
+            add(into[b], along, 1.0); // what was measured is rounding
+            after = tools.residuals(into[b], shifts);
+        }
+        tools.pool.give(scratch);
+        after
     }
 
     /// What the slice started with, for another try.
