@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use crate::eigen::block::{Row, WIDTH, ZERO};
 use crate::eigen::component::{Component, Pairs};
-use crate::eigen::gram::{Gram, SMALL_MAX, couple, larger};
+use crate::eigen::gram::{Gram, are_small, couple, larger};
 use crate::eigen::kernel::{self, Kind};
 use crate::eigen::{EigenError, Orthogonality, Progress};
 
@@ -82,8 +82,7 @@ pub(crate) fn finish(
         let couplings = gram.couplings(&places, above);
         let changed = couple(&mut blocks, &couplings, kind, progress)?;
         changed.iter().for_each(|&i| touched[i] = true);
-        if orthogonality == Orthogonality::Standard && couplings.iter().all(|couplings| couplings.largest() < SMALL_MAX)
-        {
+        if orthogonality == Orthogonality::Standard && are_small(&couplings) {
             gram.follow(&couplings);
         } else {
             gram.renew(&changed, &blocks, kind, progress)?;

@@ -224,6 +224,7 @@ fn add_update(update: &[f64], places: &[u32], front: &mut [f64], side: usize) {
     }
 }
 
+/// Adds values to entries at such places.
 #[inline(always)]
 fn add_at(to: &mut [f64], values: &[f64], places: &[u32]) {
     for (value, &place) in values.iter().zip(places) {

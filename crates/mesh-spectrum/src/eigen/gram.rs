@@ -5,9 +5,13 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use crate::eigen::block::{Row, SMALL_ZERO, Small, WIDTH, add, transpose};
-use crate::eigen::kernel::{self, Kind, PANEL, SingleRow, SingleSmall};
+use crate::eigen::kernel::{self, Kind, PANEL};
 use crate::eigen::parts::parts;
+use crate::eigen::single::{SingleRow, SingleSmall};
 use crate::eigen::{EigenError, Progress};
+
+/// Rows of all blocks that are multiplied with one another at once: with a thousand pairs they fill half of a core's cache.
+const TOGETHER: usize = PANEL / 2;
 
 /// The larger of two numbers; not a number, if one is not.
 pub(crate) fn larger(a: f64, b: f64) -> f64 {
@@ -29,11 +33,11 @@ fn products(
     };
     let one = |rows: Range<usize>| {
         let mut sums = zero();
-        for first in rows.clone().step_by(PANEL / 2) {
+        for first in rows.clone().step_by(TOGETHER) {
             progress.go_on()?;
             // Rows of all blocks that stay in a core's cache while every block meets every other.
             let panel: Vec<&[Row]> =
-                blocks.iter().map(|block| &block[first..(first + PANEL / 2).min(rows.end)]).collect();
+                blocks.iter().map(|block| &block[first..(first + TOGETHER).min(rows.end)]).collect();
             for (&i, sum) in columns.iter().zip(&mut sums) {
                 let (own, end) = of(i);
                 kernel::gram(kind, &panel[..end], &panel[own], sum);
@@ -191,7 +195,7 @@ pub(crate) struct Couplings {
 
 impl Couplings {
     /// The largest entry.
-    pub(crate) fn largest(&self) -> f64 {
+    fn largest(&self) -> f64 {
         f64::from(self.c.as_flattened().as_flattened().iter().fold(0.0f32, |most, x| most.max(x.abs())))
     }
 
@@ -207,16 +211,19 @@ impl Couplings {
 
     /// The blocks that something is added to.
     fn changed(&self) -> Vec<usize> {
-        let mut changed: Vec<usize> = self.entries().map(|(_, to, _)| to / WIDTH).collect();
-        changed.sort_unstable();
-        changed.dedup();
-        changed
+        let rows = self.c.as_flattened();
+        let is_changed = |half: &usize| rows.iter().any(|row| row[WIDTH * half..][..WIDTH].iter().any(|x| *x != 0.0));
+        (0..2).filter(is_changed).map(|half| 2 * self.pair + half).collect()
     }
 }
 
 /// Couplings below this are added in single precision: what that rounds off, 6e-8 of them, is multiplied by ‖A‖/λ_K in the
 /// residual, and leaves inner products that are known to 1e-15 without being measured again.
-pub(crate) const SMALL_MAX: f64 = 1e-8;
+const SMALL_MAX: f64 = 1e-8;
+
+pub(crate) fn are_small(couplings: &[Couplings]) -> bool {
+    couplings.iter().all(|couplings| couplings.largest() < SMALL_MAX)
+}
 
 /// V ← V + V C. Result: the blocks that have changed.
 pub(crate) fn couple(
@@ -225,7 +232,7 @@ pub(crate) fn couple(
     kind: Kind,
     progress: &Progress,
 ) -> Result<Vec<usize>, EigenError> {
-    let small = couplings.iter().all(|couplings| couplings.largest() < SMALL_MAX);
+    let small = are_small(couplings);
     let mut needed = vec![false; blocks.len()];
     couplings.iter().flat_map(|couplings| &couplings.from).for_each(|&k| needed[k] = true);
     let n = blocks[0].len();
@@ -292,7 +299,7 @@ mod tests {
             assert!(gram.loss(&places) > 0.1 * share);
             let null: Vec<f64> = blocks[0].iter().map(|row| row[0]).collect();
             let couplings = gram.couplings(&places, 0.0);
-            assert_eq!(couplings.iter().all(|couplings| couplings.largest() < SMALL_MAX), share < 1e-8);
+            assert_eq!(are_small(&couplings), share < 1e-8);
             assert_eq!(couple(&mut blocks, &couplings, kind, &progress).unwrap(), [0, 1, 2]);
             gram.follow(&couplings);
             let measured = Gram::of(&blocks, kind, &progress).unwrap();

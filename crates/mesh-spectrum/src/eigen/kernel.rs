@@ -10,6 +10,7 @@ use crate::eigen::block::{Row, SMALL_ZERO, Small, WIDTH, ZERO, add};
 use crate::eigen::factor::Pivots;
 use crate::eigen::front::{Tree, Workspace, factor_with};
 use crate::eigen::polish::{Levels, chebyshev_with};
+use crate::eigen::single::{SingleRow, SingleSmall, correct_with};
 use crate::eigen::solve::{Packed, solve_with};
 use crate::operator::Csr;
 
@@ -235,78 +236,6 @@ fn update_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>
             }
         }
     }
-}
-
-/// A row of a block, and an 8 × 16 matrix for two blocks, in single precision.
-pub(crate) type SingleRow = [f32; WIDTH];
-pub(crate) type SingleSmall = [[f32; 2 * WIDTH]; WIDTH];
-
-/// c += a·b for a row of two blocks.
-#[inline(always)]
-fn add_scaled_single<A: Arithmetic>(c: &mut [f32; 2 * WIDTH], a: f32, b: &[f32; 2 * WIDTH]) {
-    for k in 0..2 * WIDTH {
-        c[k] = A::fma_single(a, b[k], c[k]);
-    }
-}
-
-/// P times R rows from `at` on of one or two blocks W += Σ_k Q_k C_k.
-#[inline(always)]
-fn correct_tile<A: Arithmetic, const R: usize, const P: usize>(
-    q: &[&[SingleRow]],
-    c: &[SingleSmall],
-    w: &mut [&mut [Row]],
-    at: usize,
-) {
-    let mut sum = [[[0.0; 2 * WIDTH]; R]; P];
-    for (q, c) in q.iter().zip(c) {
-        let q: [&[SingleRow]; P] = std::array::from_fn(|p| &q[at + p * R..at + (p + 1) * R]);
-        for a in 0..WIDTH {
-            for r in 0..R {
-                for p in 0..P {
-                    add_scaled_single::<A>(&mut sum[p][r], q[p][r][a], &c[a]);
-                }
-            }
-        }
-    }
-    // Halves one by one, and not by a number, so that the sums stay in registers.
-    let [first, second] = match w {
-        [first] => [Some(first), None],
-        [first, second, ..] => [Some(first), Some(second)],
-        [] => [None, None],
-    };
-    add_half::<R, P, 0>(first, &sum, at);
-    add_half::<R, P, WIDTH>(second, &sum, at);
-}
-
-/// Adds eight columns of the sums, from number OWN on, to rows of a block.
-#[inline(always)]
-fn add_half<const R: usize, const P: usize, const OWN: usize>(
-    w: Option<&mut &mut [Row]>,
-    sum: &[[[f32; 2 * WIDTH]; R]; P],
-    at: usize,
-) {
-    let Some(w) = w else { return };
-    for p in 0..P {
-        let w = &mut w[at + p * R..at + (p + 1) * R];
-        for r in 0..R {
-            for k in 0..WIDTH {
-                w[r][k] += f64::from(sum[p][r][OWN + k]);
-            }
-        }
-    }
-}
-
-/// W_i += Σ_k Q_k C_k for one or two blocks W, in single precision: what is added is small.
-#[inline(always)]
-fn correct_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>(
-    q: &[&[SingleRow]],
-    c: &[SingleSmall],
-    w: &mut [&mut [Row]],
-) {
-    let rows = w.first().map_or(0, |w| w.len());
-    let whole = rows - rows % (P * R);
-    (0..whole).step_by(P * R).for_each(|at| correct_tile::<A, R, P>(q, c, w, at));
-    (whole..rows).for_each(|at| correct_tile::<A, 1, 1>(q, c, w, at));
 }
 
 /// Columns of Q at once for two W's: the registers hold as many sums as for one W and all columns.
@@ -585,6 +514,7 @@ pub(crate) mod tests {
         assert!((w[0][1] - direct).abs() <= 1e-14, "rounding of products of numbers of about 1");
         assert_eq!(w, copy);
         scale(kind, &[], &[], &s, &mut w, &mut [], &mut square);
+        seen.extend(w.iter().copied());
         let single = |block: &[Row]| -> Vec<SingleRow> { block.iter().map(|row| row.map(|x| x as f32)).collect() };
         let (q, p) = (single(&q), single(&p));
         let c = [1, 2].map(|seed| -> SingleSmall {
@@ -597,7 +527,8 @@ pub(crate) mod tests {
         correct(kind, &[&q, &p], &c, &mut [&mut w, &mut second]);
         let direct: f32 = (0..WIDTH).map(|a| q[0][a] * c[0][a][10] + p[0][a] * c[1][a][10]).sum();
         assert!((second[0][2] - v[0][2] - f64::from(direct)).abs() <= 1e-6, "single precision of numbers of about 1");
-        assert_eq!(before.len(), w.len());
+        let direct: f32 = (0..WIDTH).map(|a| q[0][a] * c[0][a][2] + p[0][a] * c[1][a][2]).sum();
+        assert!((w[0][2] - before[0][2] - f64::from(direct)).abs() <= 1e-6, "single precision of numbers of about 1");
         seen.extend(second.iter().map(|row| row.map(|x| 1e-8 * x))); // beside rounding of double precision
         seen.extend(w.iter().map(|row| row.map(|x| 1e-8 * x)));
         seen.extend(square);

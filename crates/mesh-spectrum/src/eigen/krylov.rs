@@ -476,7 +476,8 @@ impl<'a> Krylov<'a> {
         let mut nearest = std::mem::take(&mut self.nearest);
         nearest.resize_with(NEAREST, || self.tools.pool.take(self.n + 1));
         let mut into: Vec<&mut [Row]> = nearest.iter_mut().map(|x| &mut x[..self.n]).collect();
-        let combined = self.combine(&ritz, chosen, false, &mut into);
+        let clock = &self.tools.progress.clock;
+        let combined = clock.time(Step::Vectors, || self.combine(&ritz, chosen, false, &mut into));
         self.nearest = nearest;
         let column = |&k: &usize| (0..ritz.values.len()).map(|i| ritz.vectors[(i, k)]).collect();
         self.loss.deflate(chosen.iter().map(column).collect());
@@ -544,7 +545,7 @@ impl<'a> Krylov<'a> {
         self.clear(&mut c, used);
         let blocks: Vec<&[Row]> = self.basis[..used].iter().map(|block| &block[..self.n]).collect();
         let Tools { kind, progress, .. } = self.tools;
-        progress.clock.time(Step::Vectors, || parts::combine(kind, &blocks, &c, into, progress))
+        parts::combine(kind, &blocks, &c, into, progress)
     }
 
     /// Ends the space and leaves the chosen Ritz vectors, a multiple of eight, to the next one.

@@ -4,7 +4,7 @@
 //! order), `spectrum` (how far each one's spectrum must go), `factor` with `front` (L D Lᵀ and inertia), `solve` (its
 //! solves), `chain` (shifts, one after another),
 //! `slice` (the pairs around a shift), `krylov` with `projected`, `dense` and `loss` (the space they are found in),
-//! `assemble` (chains to a spectrum), `finish` with `gram` (orthogonality, residuals), `output` (eigenvectors on
+//! `assemble` (chains to a spectrum), `finish` with `gram` and `single` (orthogonality, residuals), `output` (eigenvectors on
 //! vertices), `basis` (the result). `kernel`, `parts` (the same on several threads), `block` and `pages` hold what the
 //! time is spent in. `general` does all of it for a mass that is not diagonal.
 
@@ -30,6 +30,7 @@ mod parts;
 mod polish;
 mod projected;
 mod seconds;
+mod single;
 mod slice;
 mod solve;
 mod spectrum;

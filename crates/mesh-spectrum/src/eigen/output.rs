@@ -114,10 +114,9 @@ fn write(
 
 /// Makes the entry of largest magnitude positive; among those within 1e-3 of it, the first.
 pub(crate) fn fix_sign(phi: &mut [f64]) {
-    let (eights, rest) = phi.as_chunks();
+    let (eights, rest) = phi.as_chunks::<WIDTH>();
     let mut most = ZERO; // of eight columns at once: one comparison would wait for the one before
     for eight in eights {
-        let eight: &Row = eight;
         (0..WIDTH).for_each(|k| most[k] = if eight[k].abs() > most[k] { eight[k].abs() } else { most[k] });
     }
     let most = most.iter().chain(rest).fold(0.0f64, |most, x| most.max(x.abs()));

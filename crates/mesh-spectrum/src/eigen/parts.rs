@@ -77,15 +77,6 @@ pub(crate) fn take_off(kind: Kind, blocks: &[&[Row]], c: &[Small], ws: &mut [&mu
     });
 }
 
-/// W = Σ_k Q_k C_k.
-pub(crate) fn sum_of(kind: Kind, blocks: &[&[Row]], c: &[Small], w: &mut [Row]) {
-    let part = part(w.len());
-    w.par_chunks_mut(part).enumerate().for_each(|(number, w)| {
-        let rows = number * part..number * part + w.len();
-        kernel::update(kind, &of(blocks, &rows), c, &mut [w], false);
-    });
-}
-
 /// W −= Σ_k Q_k C_k, then out_i = P_iᵀ W and, after them, Wᵀ W and, if there is a V, P_iᵀ V, in one pass.
 pub(crate) fn recur(
     kind: Kind,

@@ -53,6 +53,17 @@ impl Tools<'_> {
         kernel::residual(self.kind, self.matrix, x, eigenvalues, &mut squares);
         squares.map(f64::sqrt)
     }
+
+    /// x ← x − d, unless a residual is above `most` then. Result: the residuals.
+    fn take_off(&self, x: &mut [Row], d: &[Row], eigenvalues: &Row, most: f64) -> Row {
+        add(x, d, -1.0);
+        let residuals = self.residuals(x, eigenvalues);
+        if largest(&residuals) <= most {
+            return residuals;
+        }
+        add(x, d, 1.0);
+        self.residuals(x, eigenvalues)
+    }
 }
 
 /// The backward error of a factor, beside the residual allowed, with which its vectors cannot be saved: polishing takes
@@ -252,8 +263,10 @@ impl Slice<'_> {
     /// Writes the vectors into blocks of eight, the last one filled up with zeros, and makes their residuals small.
     /// Result: ‖A x − λ x‖ of each.
     pub(crate) fn vectors(&self, tools: &Tools, into: &mut [&mut [Row]]) -> Result<Vec<f64>, Trouble> {
-        self.space.vectors(&self.ritz, &self.chosen, into)?;
-        tools.progress.clock.time(Step::Vectors, || self.settle(tools, into))
+        tools.progress.clock.time(Step::Vectors, || {
+            self.space.vectors(&self.ritz, &self.chosen, into)?;
+            self.settle(tools, into)
+        })
     }
 
     /// Makes the residuals of vectors small, where they are not; returns them.
@@ -286,7 +299,7 @@ impl Slice<'_> {
                 for b in 0..into.len() {
                     if largest(&residuals[b]) > allowed {
                         tools.progress.go_on()?;
-                        residuals[b] = self.purge(tools, b, into, &beyond, &shifts[b], &residuals[b]);
+                        residuals[b] = self.purge(tools, b, into, &beyond, &shifts[b], &residuals[b])?;
                     }
                 }
                 continue;
@@ -305,21 +318,16 @@ impl Slice<'_> {
     /// Polishes the vectors of a block, or does a step of inverse iteration. Result: their residuals.
     fn improve(&self, tools: &Tools, remedy: Remedy, x: &mut [Row], shifts: &Row, residuals: &Row) -> Row {
         let n = tools.matrix.rows();
-        let most = largest(residuals);
         let mut scratch = [tools.pool.take(n + 1), tools.pool.take(n + 1)];
+        let [d, other] = &mut scratch;
         let residuals = if let Remedy::Polish = remedy {
             let levels = tools.levels.get_or_init(|| Levels::new(tools.matrix));
-            let [first, second] = &mut scratch;
-            polish(tools.kind, levels, tools.norm, shifts, most / (0.3 * tools.allowed()), x, [first, second])
+            let excess = largest(residuals) / (0.3 * tools.allowed());
+            polish(tools.kind, levels, tools.norm, shifts, excess, x, [d, other])
         } else {
-            step(tools, self.factor, x, shifts, &mut scratch[0]);
-            let after = tools.residuals(x, shifts);
-            if largest(&after) > WORSE_MAX * most {
-                add(x, &scratch[0], 1.0); // the factor is worse than the vectors
-                tools.residuals(x, shifts)
-            } else {
-                after
-            }
+            remainder(tools, x, shifts, d);
+            kernel::solve(tools.kind, &self.factor.packed, d);
+            tools.take_off(x, d, shifts, WORSE_MAX * largest(residuals)) // or the factor is worse than the vectors
         };
         tools.pool.give(scratch);
         residuals
@@ -335,15 +343,12 @@ impl Slice<'_> {
         beyond: &[Block],
         shifts: &Row,
         residuals: &Row,
-    ) -> Row {
-        let Tools { matrix, kind, top, .. } = *tools;
-        let n = matrix.rows();
+    ) -> Result<Row, EigenError> {
+        let Tools { kind, top, .. } = *tools;
+        let n = tools.matrix.rows();
         let mut scratch = [tools.pool.take(n + 1), tools.pool.take(n + 1)];
         let [r, along] = scratch.each_mut().map(|block| &mut block[..n]);
-        kernel::sparse(kind, matrix, into[b], r);
-        for (r, x) in r.iter_mut().zip(&*into[b]) {
-            (0..WIDTH).for_each(|k| r[k] -= shifts[k] * x[k]);
-        }
+        remainder(tools, into[b], shifts, r);
         let mut others: Vec<&[Row]> = into.iter().map(|block| &block[..]).collect();
         others.extend(beyond.iter().map(|block| &block[..n]));
         let mut c = vec![SMALL_ZERO; others.len()];
@@ -360,15 +365,10 @@ impl Slice<'_> {
                 }
             }
         }
-        parts::sum_of(kind, &others, &c, along);
-        add(into[b], along, -1.0);
-        let mut after = tools.residuals(into[b], shifts);
-        if largest(&after) > largest(residuals) {
-            add(into[b], along, 1.0); // what was measured is rounding
-            after = tools.residuals(into[b], shifts);
-        }
+        parts::combine(kind, &others, &c, &mut [&mut *along], tools.progress)?;
+        let residuals = tools.take_off(into[b], along, shifts, largest(residuals)); // or what was measured is rounding
         tools.pool.give(scratch);
-        after
+        Ok(residuals)
     }
 
     /// What the slice started with, for another try.
@@ -394,7 +394,8 @@ enum Remedy {
     Polish,
     /// Pairs known already, against what a vector has of them.
     Purge,
-    /// A step of inverse iteration, against what lies farther from the shift than the vector, whatever it is.
+    /// A step of inverse iteration, x − (A − σI)⁻¹ (A − λI) x, against what lies farther from the shift than λ does, be it
+    /// at frequencies that polishing must leave alone.
     Step,
 }
 
@@ -414,17 +415,12 @@ fn filled(eigenvalues: &[f64], with: f64) -> Row {
     std::array::from_fn(|k| eigenvalues.get(k).copied().unwrap_or(with))
 }
 
-/// x ← x − d with d = (A − σI)⁻¹ (A − λI) x, a step of inverse iteration: takes away what lies farther from the shift
-/// than λ does, be it at frequencies that polishing must leave alone. `d` has one row more than x.
-fn step(tools: &Tools, factor: &Factor, x: &mut [Row], eigenvalues: &Row, d: &mut [Row]) {
-    kernel::sparse(tools.kind, tools.matrix, x, d);
-    for (r, x) in d.iter_mut().zip(&*x) {
-        for k in 0..WIDTH {
-            r[k] -= eigenvalues[k] * x[k];
-        }
+/// r = (A − λI) x.
+fn remainder(tools: &Tools, x: &[Row], eigenvalues: &Row, r: &mut [Row]) {
+    kernel::sparse(tools.kind, tools.matrix, x, r);
+    for (r, x) in r.iter_mut().zip(x) {
+        (0..WIDTH).for_each(|k| r[k] -= eigenvalues[k] * x[k]);
     }
-    kernel::solve(tools.kind, &factor.packed, d);
-    add(x, d, -1.0);
 }
 
 /// The largest of a block's residuals; not a number, if one is not.

@@ -30,8 +30,10 @@ pub(crate) fn lowest(
         .zip(dense)
         .map(|(component, dense)| dense.then(|| solve_dense(component)).transpose())
         .collect::<Result<_, _>>()?;
-    let (top, below) = top(components, &solved, count, progress)?;
-    let aim = aim(components, top, below.iter().sum(), count);
+    let area = components.iter().map(|component| component.area).sum();
+    let law = Weyl::closed(area, Some(components.iter().map(Component::rows).sum()));
+    let (top, below) = top(components, &solved, law, count, progress)?;
+    let aim = aim(law, top, below.iter().sum(), count);
     components
         .par_iter()
         .zip(&mut solved)
@@ -63,10 +65,8 @@ pub(crate) fn lowest(
 const AIM: f64 = 0.98;
 
 /// About λ_K, which residuals are relative to, and rather less than more.
-fn aim(components: &[Component], top: f64, total: usize, count: usize) -> f64 {
-    let area = components.iter().map(|component| component.area).sum();
-    let dofs = components.iter().map(Component::rows).sum();
-    let last = Weyl::closed(area, Some(dofs)).through(top, total as f64).inverse(count as f64);
+fn aim(law: Weyl, top: f64, total: usize, count: usize) -> f64 {
+    let last = law.through(top, total as f64).inverse(count as f64);
     if last < top { AIM * last } else { top }
 }
 
@@ -75,6 +75,7 @@ fn aim(components: &[Component], top: f64, total: usize, count: usize) -> f64 {
 fn top(
     components: &[Component],
     solved: &[Option<Pairs>],
+    law: Weyl,
     count: usize,
     progress: &Progress,
 ) -> Result<(f64, Vec<usize>), EigenError> {
@@ -94,8 +95,6 @@ fn top(
     }
     // Counting a few more costs as many pairs more; counting again costs a factorisation.
     let enough = wanted..=(wanted + 4 + count / 125).min(dofs);
-    let area: f64 = components.iter().map(|component| component.area).sum();
-    let law = Weyl::closed(area, Some(dofs));
     let (mut low, mut high) = (0.0, 2.0 * components.iter().map(|component| component.norm).fold(0.0, f64::max));
     let mut at = law.inverse(wanted as f64).min(0.5 * high);
     for round in 0..200 {

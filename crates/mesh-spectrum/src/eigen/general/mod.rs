@@ -129,7 +129,8 @@ fn top(
     let enough = wanted..=(wanted + 4 + count / 40).min(dofs);
     let area: f64 = pencils.iter().map(|pencil| pencil.area).sum();
     let (mut low, mut high) = (0.0, 2.0 * pencils.iter().map(Pencil::norm).fold(0.0, f64::max));
-    let mut at = Weyl::closed(area, None).inverse(wanted as f64).min(0.5 * high);
+    let law = Weyl::closed(area, None);
+    let mut at = law.inverse(wanted as f64).min(0.5 * high);
     let clock = &progress.clock;
     let counts = |at: f64| -> Option<Vec<usize>> {
         let below = |(pencil, solved): (&Pencil, &Option<Pairs>)| match solved {
@@ -159,7 +160,7 @@ fn top(
             high = at
         }
         let middle = 0.5 * (*enough.start() + *enough.end()) as f64;
-        let guess = Weyl::closed(area, None).through(at, total as f64).inverse(middle);
+        let guess = law.through(at, total as f64).inverse(middle);
         at = if guess > low && guess < high && round < 8 { guess } else { 0.5 * (low + high) };
         if high - low < 1e-7 * high {
             at = high;
