@@ -83,7 +83,11 @@ pub(crate) struct Pool {
 impl Pool {
     pub(crate) fn take(&self, rows: usize) -> Block {
         let free = self.free.lock().unwrap_or_else(PoisonError::into_inner).pop();
-        free.unwrap_or_else(|| Block::zeros(rows))
+        free.unwrap_or_else(|| {
+            let mut fresh = Block::zeros(rows);
+            pages::touch(&mut fresh);
+            fresh
+        })
     }
 
     pub(crate) fn give(&self, blocks: impl IntoIterator<Item = Block>) {

@@ -75,9 +75,12 @@ pub(crate) struct Found {
     pub(crate) counts: Vec<(f64, usize)>,
 }
 
-/// Blocks that a chain for so many pairs may use: the last block of every slice is not full.
-pub(crate) fn blocks_needed(rows: usize, pairs: usize) -> usize {
-    pairs.div_ceil(WIDTH) + slices_max(rows, pairs)
+/// Blocks that a chain for so many pairs may use: the last block of every slice is not full. At the first attempt no more
+/// than a chain mostly needs, because the result is put together over what a chain leaves unused, and memory is dear to
+/// touch for the first time.
+pub(crate) fn blocks_needed(rows: usize, pairs: usize, attempt: usize) -> usize {
+    let slices = if attempt == 0 { slices_expected(rows, pairs) + 1 } else { slices_max(rows, pairs) };
+    pairs.div_ceil(WIDTH) + slices
 }
 
 /// About so many slices find so many pairs.

@@ -238,7 +238,7 @@ impl Component {
         progress.expect_slices(spans.iter().map(|span| slices_expected(self.rows(), span.end - span.first)).sum());
 
         let n = self.rows();
-        let needed: Vec<usize> = spans.iter().map(|span| blocks_needed(self.rows(), span.end - span.first)).collect();
+        let needed: Vec<usize> = spans.iter().map(|span| blocks_needed(n, span.end - span.first, attempt)).collect();
         let mut vectors = Block::zeros(n * needed.iter().sum::<usize>());
         let mut blocks: Vec<&mut [Row]> = vectors.chunks_exact_mut(n).collect();
         let mut shares = Vec::new();

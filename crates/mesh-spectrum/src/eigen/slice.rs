@@ -11,6 +11,7 @@ use crate::eigen::factor::Factor;
 use crate::eigen::gram::larger;
 use crate::eigen::kernel::{self, Kind};
 use crate::eigen::krylov::{Handover, Krylov};
+use crate::eigen::pages;
 use crate::eigen::parts;
 use crate::eigen::polish::{Levels, polish};
 use crate::eigen::projected::Ritz;
@@ -264,6 +265,7 @@ impl Slice<'_> {
     /// Result: ‖A x − λ x‖ of each.
     pub(crate) fn vectors(&self, tools: &Tools, into: &mut [&mut [Row]]) -> Result<Vec<f64>, Trouble> {
         tools.progress.clock.time(Step::Vectors, || {
+            into.iter_mut().for_each(|block| pages::touch(block));
             self.space.vectors(&self.ritz, &self.chosen, into)?;
             self.settle(tools, into)
         })
