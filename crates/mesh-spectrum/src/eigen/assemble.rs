@@ -13,7 +13,7 @@ pub(crate) struct Joined {
     pub(crate) residuals: Vec<f64>,
 }
 
-/// Joins the chains of one component, each pair taken from one of them; a chain's places are counted from `starts`.
+/// Joins the chains of one component, each pair taken from one of them; `starts` says where each chain's vectors begin.
 ///
 /// Around the value where two chains meet, both number their pairs from the inertia count there. Where both found a
 /// pair of the same number, its eigenvalues must agree: had either missed one, the numbers would be shifted.
@@ -28,7 +28,7 @@ pub(crate) fn assemble(chains: &[Found], starts: &[usize], top: f64, tolerance: 
     for ((chain, start), ends) in chains.iter().zip(starts).zip(borders.windows(2)) {
         for number in ends[0]..ends[1] {
             joined.eigenvalues.push(chain.eigenvalues[number - chain.first]);
-            joined.places.push(start + chain.places[number - chain.first]);
+            joined.places.push(start + number - chain.first);
             joined.residuals.push(chain.residuals[number - chain.first]);
         }
     }
@@ -91,8 +91,8 @@ mod tests {
     use super::*;
 
     fn chain(first: usize, eigenvalues: &[f64]) -> Found {
-        let (places, residuals) = ((0..eigenvalues.len()).collect(), vec![0.0; eigenvalues.len()]);
-        Found { first, eigenvalues: eigenvalues.to_vec(), places, residuals, counts: Vec::new() }
+        let residuals = vec![0.0; eigenvalues.len()];
+        Found { first, eigenvalues: eigenvalues.to_vec(), residuals, counts: Vec::new() }
     }
 
     #[test]

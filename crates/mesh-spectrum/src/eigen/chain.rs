@@ -8,7 +8,7 @@ use crate::eigen::block::{Row, WIDTH};
 use crate::eigen::component::mix;
 use crate::eigen::factor::{Factor, Symbolic};
 use crate::eigen::krylov::Handover;
-use crate::eigen::slice::{CUT_GAP, Demand, Failure, Tools, Trouble, slice};
+use crate::eigen::slice::{CUT_GAP, Demand, Failure, Slice, Tools, Trouble, slice};
 use crate::eigen::weyl::Weyl;
 
 /// Pairs of a slice. Fewer: more factorisations; more: a longer way from shift to shift, by the square of which errors of
@@ -65,22 +65,12 @@ pub(crate) struct Span {
 pub(crate) struct Found {
     /// The number of the first pair.
     pub(crate) first: usize,
-    /// Ascending.
+    /// Ascending. The vector of number k is column k mod 8 of block k / 8.
     pub(crate) eigenvalues: Vec<f64>,
-    /// Where each one's vector is: 8 × block + column.
-    pub(crate) places: Vec<usize>,
     /// ‖A x − λ x‖ of each.
     pub(crate) residuals: Vec<f64>,
     /// Shifts, and the eigenvalues below each by inertia.
     pub(crate) counts: Vec<(f64, usize)>,
-}
-
-/// Blocks that a chain for so many pairs may use: the last block of every slice is not full. At the first attempt no more
-/// than a chain mostly needs, because the result is put together over what a chain leaves unused, and memory is dear to
-/// touch for the first time.
-pub(crate) fn blocks_needed(rows: usize, pairs: usize, attempt: usize) -> usize {
-    let slices = if attempt == 0 { slices_expected(rows, pairs) + 1 } else { slices_max(rows, pairs) };
-    pairs.div_ceil(WIDTH) + slices
 }
 
 /// About so many slices find so many pairs.
@@ -92,18 +82,17 @@ fn slices_max(rows: usize, pairs: usize) -> usize {
     2 * pairs / pairs_a_slice(rows) + 4
 }
 
-/// Finds the pairs of a span and writes their vectors into `blocks`.
+/// Finds the pairs of a span and writes their vectors into `blocks`, one after another.
 pub(crate) fn chain(
     tools: &Tools,
     symbolic: &Symbolic,
     weyl: Weyl,
     span: Span,
-    mut blocks: &mut [&mut [Row]],
+    blocks: &mut [&mut [Row]],
 ) -> Result<Found, Trouble> {
     let Span { first, end, low, high, seed, attempt, border: _, border_count: _ } = span;
     let rows = tools.matrix.rows();
     let mut found = Found { first, ..Found::default() };
-    let mut next_block = 0;
     let mut ahead: Vec<f64> = Vec::new();
     let mut handover: Option<Handover> = None;
     let mut dimension: Option<usize> = None;
@@ -143,11 +132,9 @@ pub(crate) fn chain(
             symbolic.recycle(factor);
             continue;
         }
-        let done = done.map_err(Failure::into_trouble).and_then(|slice| {
-            let count = slice.eigenvalues.len();
-            let own = blocks.get_mut(..count.div_ceil(WIDTH));
-            let own = own.ok_or_else(|| Trouble::Again("more slices than foreseen".into()))?;
-            match slice.vectors(tools, own) {
+        let done = done.map_err(Failure::into_trouble).and_then(|mut slice| {
+            slice.truncate(left_over);
+            match vectors(tools, &slice, found.eigenvalues.len(), blocks) {
                 Ok(residuals) => Ok((residuals, slice)),
                 Err(trouble) => {
                     handover = slice.give_back();
@@ -178,18 +165,11 @@ pub(crate) fn chain(
             )));
         }
         let count = slice.eigenvalues.len();
-        let used = count.div_ceil(WIDTH);
-        blocks = blocks.split_at_mut(used).1;
         found.residuals.extend(residuals);
-        found.places.extend((0..count).map(|k| WIDTH * next_block + k));
         found.eigenvalues.extend(&slice.eigenvalues);
-        next_block += used;
-        tools.progress.slice(count.min(left_over));
+        tools.progress.slice(count);
         below += count;
-        if last {
-            found.eigenvalues.truncate(end - first);
-            found.places.truncate(end - first);
-            found.residuals.truncate(end - first);
+        if below == end {
             return Ok(found);
         }
         low = found.eigenvalues.last().copied().unwrap_or(low);
@@ -202,6 +182,28 @@ pub(crate) fn chain(
         symbolic.recycle(factor);
     }
     Err(Trouble::Again("more slices than foreseen".into()))
+}
+
+/// Writes a slice's vectors behind `done` others. Result: their residuals.
+fn vectors(tools: &Tools, slice: &Slice, done: usize, blocks: &mut [&mut [Row]]) -> Result<Vec<f64>, Trouble> {
+    let (first, lead) = (done / WIDTH, done % WIDTH);
+    let end = (done + slice.eigenvalues.len()).div_ceil(WIDTH);
+    let own = &mut blocks[first..end];
+    let [shared, rest @ ..] = own else { return Ok(Vec::new()) };
+    if lead == 0 {
+        return slice.vectors(tools, lead, own);
+    }
+    // The slice before has columns in the first block.
+    let n = shared.len();
+    let mut apart = tools.pool.take(n + 1);
+    let mut into: Vec<&mut [Row]> =
+        [&mut apart[..n]].into_iter().chain(rest.iter_mut().map(|block| &mut **block)).collect();
+    let residuals = slice.vectors(tools, lead, &mut into);
+    if residuals.is_ok() {
+        shared.iter_mut().zip(&apart[..n]).for_each(|(to, from)| to[lead..].copy_from_slice(&from[lead..]));
+    }
+    tools.pool.give([apart]);
+    residuals
 }
 
 /// The middle of the widest gap near the place of number `under` among values that may be eigenvalues.

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use crate::eigen::assemble::{Joined, assemble, check_counts};
 use crate::eigen::block::{Block, Pool, Row, WIDTH};
-use crate::eigen::chain::{Found, Span, blocks_needed, chain, lead, slices_expected};
+use crate::eigen::chain::{Found, Span, chain, lead, slices_expected};
 use crate::eigen::dense;
 use crate::eigen::factor::{Factor, Symbolic};
 use crate::eigen::kernel::Kind;
@@ -238,7 +238,7 @@ impl Component {
         progress.expect_slices(spans.iter().map(|span| slices_expected(self.rows(), span.end - span.first)).sum());
 
         let n = self.rows();
-        let needed: Vec<usize> = spans.iter().map(|span| blocks_needed(n, span.end - span.first, attempt)).collect();
+        let needed: Vec<usize> = spans.iter().map(|span| (span.end - span.first).div_ceil(WIDTH)).collect();
         let mut vectors = Block::zeros(n * needed.iter().sum::<usize>());
         let mut blocks: Vec<&mut [Row]> = vectors.chunks_exact_mut(n).collect();
         let mut shares = Vec::new();

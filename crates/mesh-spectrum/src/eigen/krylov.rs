@@ -477,7 +477,7 @@ impl<'a> Krylov<'a> {
         nearest.resize_with(NEAREST, || self.tools.pool.take(self.n + 1));
         let mut into: Vec<&mut [Row]> = nearest.iter_mut().map(|x| &mut x[..self.n]).collect();
         let clock = &self.tools.progress.clock;
-        let combined = clock.time(Step::Vectors, || self.combine(&ritz, chosen, false, &mut into));
+        let combined = clock.time(Step::Vectors, || self.combine(&ritz, chosen, 0, false, &mut into));
         self.nearest = nearest;
         let column = |&k: &usize| (0..ritz.values.len()).map(|i| ritz.vectors[(i, k)]).collect();
         self.loss.deflate(chosen.iter().map(column).collect());
@@ -504,11 +504,17 @@ impl<'a> Krylov<'a> {
         self.tools.progress.clock.time(Step::Project, || self.projected.ritz(self.dimension()))
     }
 
-    /// Ritz vectors of the chosen columns into blocks of eight (the last one filled up with zeros), with one step of
-    /// inverse iteration that costs no solve: x = B s + Q_{m+1} R s_last / θ is Op B s / θ, so that the residual
-    /// (A − λ) x is β (λ − σ)², free of the factor ‖A‖.
-    pub(crate) fn vectors(&self, ritz: &Ritz, chosen: &[usize], into: &mut [&mut [Row]]) -> Result<(), EigenError> {
-        self.combine(ritz, chosen, true, into)
+    /// Ritz vectors of the chosen columns into blocks of eight, from column `lead` of the first one on (the others are
+    /// zero), with one step of inverse iteration that costs no solve: x = B s + Q_{m+1} R s_last / θ is Op B s / θ, so that
+    /// the residual (A − λ) x is β (λ − σ)², free of the factor ‖A‖.
+    pub(crate) fn vectors(
+        &self,
+        ritz: &Ritz,
+        chosen: &[usize],
+        lead: usize,
+        into: &mut [&mut [Row]],
+    ) -> Result<(), EigenError> {
+        self.combine(ritz, chosen, lead, true, into)
     }
 
     /// Takes off coefficients along so many blocks what the blocks have in common.
@@ -530,13 +536,14 @@ impl<'a> Krylov<'a> {
         &self,
         ritz: &Ritz,
         chosen: &[usize],
+        lead: usize,
         inverse_step: bool,
         into: &mut [&mut [Row]],
     ) -> Result<(), EigenError> {
         let used = self.dimension() / WIDTH + usize::from(inverse_step);
-        let mut c = coefficients(ritz, chosen, used);
+        let mut c = coefficients(ritz, chosen, lead, used);
         if inverse_step {
-            for (place, &column) in chosen.iter().enumerate() {
+            for (place, &column) in (lead..).zip(chosen) {
                 for (a, x) in ritz.couplings[column].iter().enumerate() {
                     c[place / WIDTH * used + used - 1][a][place % WIDTH] = x / ritz.values[column];
                 }
@@ -552,7 +559,7 @@ impl<'a> Krylov<'a> {
     pub(crate) fn hand_over(mut self, ritz: &Ritz, chosen: &[usize]) -> Result<Handover, EigenError> {
         let Tools { kind, progress, pool, .. } = self.tools;
         let used = self.basis.len();
-        let mut c = coefficients(ritz, chosen, used);
+        let mut c = coefficients(ritz, chosen, 0, used);
         // And the block that comes next, as it is.
         c.resize(c.len() + used - 1, SMALL_ZERO);
         c.push(std::array::from_fn(|a| std::array::from_fn(|k| f64::from(a == k))));
@@ -581,10 +588,11 @@ impl<'a> Krylov<'a> {
     }
 }
 
-/// The coefficients of Ritz vectors along so many blocks of a basis, a block's after another's.
-fn coefficients(ritz: &Ritz, chosen: &[usize], blocks: usize) -> Vec<Small> {
-    let mut c = vec![SMALL_ZERO; blocks * chosen.len().div_ceil(WIDTH)];
-    for (place, &column) in chosen.iter().enumerate() {
+/// The coefficients of Ritz vectors, after `lead` columns of zeros, along so many blocks of a basis, a block's after
+/// another's.
+fn coefficients(ritz: &Ritz, chosen: &[usize], lead: usize, blocks: usize) -> Vec<Small> {
+    let mut c = vec![SMALL_ZERO; blocks * (lead + chosen.len()).div_ceil(WIDTH)];
+    for (place, &column) in (lead..).zip(chosen) {
         let (c, to) = (&mut c[place / WIDTH * blocks..][..blocks], place % WIDTH);
         for (from, value) in ritz.vectors.col(column).iter().enumerate() {
             c[from / WIDTH][from % WIDTH][to] = *value;

@@ -17,14 +17,14 @@ pub(crate) fn expected(components: &[Component], dense: &[bool], count: usize, v
     let mut working: Vec<usize> = Vec::new();
     for (component, dense) in components.iter().zip(dense) {
         let n = component.rows();
-        // By Weyl's law, with the last block of every slice not full.
+        // By Weyl's law; neighbouring chains both find a few, and the last block of a chain is not full.
         let pairs = ((component.area / area * count as f64) as usize + 2).min(n);
         kept += component.bytes();
         if *dense {
             working.push(24 * n * n);
             continue;
         }
-        kept += 8 * n * (pairs + pairs / 8 + WIDTH);
+        kept += 8 * n * (pairs + 2 * WIDTH * chains(pairs));
         let chain = 8 * n * COLUMNS_A_CHAIN.min(n) + component.factor_bytes();
         working.extend((0..chains(pairs)).map(|_| chain));
     }

@@ -256,26 +256,32 @@ fn cut(above: &[usize], eigenvalue: &dyn Fn(&usize) -> f64, right: usize, least:
 }
 
 impl Slice<'_> {
+    /// Leaves the lowest pairs, so many at most.
+    pub(crate) fn truncate(&mut self, count: usize) {
+        self.eigenvalues.truncate(count);
+        self.chosen.truncate(count);
+    }
+
     /// Eigenvalues that may lie above the slice, ascending: the nearest third have mostly converged.
     pub(crate) fn ahead(&self) -> Vec<f64> {
         self.beyond.iter().map(|&k| self.factor.shift + 1.0 / self.ritz.values[k]).collect()
     }
 
-    /// Writes the vectors into blocks of eight, the last one filled up with zeros, and makes their residuals small.
-    /// Result: ‖A x − λ x‖ of each.
-    pub(crate) fn vectors(&self, tools: &Tools, into: &mut [&mut [Row]]) -> Result<Vec<f64>, Trouble> {
+    /// Writes the vectors into blocks of eight, from column `lead` of the first one on (the others are zero), and makes
+    /// their residuals small. Result: ‖A x − λ x‖ of each.
+    pub(crate) fn vectors(&self, tools: &Tools, lead: usize, into: &mut [&mut [Row]]) -> Result<Vec<f64>, Trouble> {
         tools.progress.clock.time(Step::Vectors, || {
             into.iter_mut().for_each(|block| pages::touch(block));
-            self.space.vectors(&self.ritz, &self.chosen, into)?;
-            self.settle(tools, into)
+            self.space.vectors(&self.ritz, &self.chosen, lead, into)?;
+            self.settle(tools, lead, into)
         })
     }
 
     /// Makes the residuals of vectors small, where they are not; returns them.
-    fn settle(&self, tools: &Tools, into: &mut [&mut [Row]]) -> Result<Vec<f64>, Trouble> {
+    fn settle(&self, tools: &Tools, lead: usize, into: &mut [&mut [Row]]) -> Result<Vec<f64>, Trouble> {
         let n = tools.matrix.rows();
         let allowed = tools.allowed();
-        let shifts: Vec<Row> = self.eigenvalues.chunks(WIDTH).map(|chunk| filled(chunk, 0.0)).collect();
+        let shifts: Vec<Row> = columns(&self.eigenvalues, lead, 0.0);
         let mut residuals: Vec<Row> =
             into.par_iter().zip(&shifts).map(|(x, shifts)| tools.residuals(x, shifts)).collect();
         let mut remedies = REMEDIES.iter();
@@ -285,7 +291,7 @@ impl Slice<'_> {
             let most = residuals.iter().map(largest).fold(0.0, larger);
             if most <= allowed {
                 tools.pool.give(beyond);
-                return Ok(residuals.concat()[..self.eigenvalues.len()].to_vec());
+                return Ok(residuals.concat()[lead..][..self.eigenvalues.len()].to_vec());
             }
             let Some(remedy) = remedies.next().filter(|_| most.is_finite()) else {
                 return Err(Trouble::Again(format!("residual {most:e}, {allowed:e} allowed")));
@@ -295,13 +301,13 @@ impl Slice<'_> {
                     let next = &self.beyond[..self.beyond.len().min(WIDTH * BEYOND)];
                     beyond.resize_with(next.len().div_ceil(WIDTH), || tools.pool.take(n + 1));
                     let mut into: Vec<&mut [Row]> = beyond.iter_mut().map(|x| &mut x[..n]).collect();
-                    self.space.vectors(&self.ritz, next, &mut into)?;
+                    self.space.vectors(&self.ritz, next, 0, &mut into)?;
                 }
                 // One after another, because each is purged of the others.
                 for b in 0..into.len() {
                     if largest(&residuals[b]) > allowed {
                         tools.progress.go_on()?;
-                        residuals[b] = self.purge(tools, b, into, &beyond, &shifts[b], &residuals[b])?;
+                        residuals[b] = self.purge(tools, (b, lead), into, &beyond, &shifts[b], &residuals[b])?;
                     }
                 }
                 continue;
@@ -340,7 +346,7 @@ impl Slice<'_> {
     fn purge(
         &self,
         tools: &Tools,
-        b: usize,
+        (b, lead): (usize, usize),
         into: &mut [&mut [Row]],
         beyond: &[Block],
         shifts: &Row,
@@ -357,9 +363,9 @@ impl Slice<'_> {
         parts::gram(kind, &others, &[&*r], &mut c);
         let ahead = self.ahead();
         let ahead = &ahead[..ahead.len().min(WIDTH * beyond.len())];
-        let eigenvalues = self.eigenvalues.chunks(WIDTH).chain(ahead.chunks(WIDTH));
-        for (c, eigenvalues) in c.iter_mut().zip(eigenvalues) {
-            for (row, eigenvalue) in c.iter_mut().zip(filled(eigenvalues, f64::NAN)) {
+        let eigenvalues = [columns(&self.eigenvalues, lead, f64::NAN), columns(ahead, 0, f64::NAN)].concat();
+        for (c, eigenvalues) in c.iter_mut().zip(&eigenvalues) {
+            for (row, eigenvalue) in c.iter_mut().zip(eigenvalues) {
                 for k in 0..WIDTH {
                     let gap = eigenvalue - shifts[k];
                     // Within a cluster any combination will do; and some columns belong to no pair.
@@ -412,9 +418,12 @@ const REMEDIES: [Remedy; 7] =
 /// By how much a step may enlarge a residual, along pairs next to the shift, which a purge takes out again.
 const WORSE_MAX: f64 = 10.0;
 
-/// Eigenvalues of a block, filled up with something.
-fn filled(eigenvalues: &[f64], with: f64) -> Row {
-    std::array::from_fn(|k| eigenvalues.get(k).copied().unwrap_or(with))
+/// The eigenvalues of blocks, from column `lead` of the first one on, and something else in the columns without one.
+fn columns(eigenvalues: &[f64], lead: usize, without: f64) -> Vec<Row> {
+    let of_column =
+        |column: usize| column.checked_sub(lead).and_then(|k| eigenvalues.get(k)).copied().unwrap_or(without);
+    let blocks = (lead + eigenvalues.len()).div_ceil(WIDTH);
+    (0..blocks).map(|b| std::array::from_fn(|k| of_column(WIDTH * b + k))).collect()
 }
 
 /// r = (A − λI) x.
