@@ -70,13 +70,13 @@ pub(crate) fn solve_with<A: Arithmetic, const R: usize, const HIGH: usize, const
     if let Some(scratch) = x.last_mut() {
         *scratch = ZERO;
     }
-    let mut asked = Asked { values: factor.layout.len, rows: factor.layout.rows.len() };
+    let mut asked = Asked { values: factor.layout.len, until: factor.layout.len, rows: factor.layout.rows.len() };
     for supernode in factor.layout.supernodes.iter().rev() {
         asked.go_on(factor, supernode, x);
         match supernode.width {
-            1 => backward_narrow::<A, 1>(factor, supernode, x),
-            2 => backward_narrow::<A, 2>(factor, supernode, x),
-            _ => backward::<A, HIGH>(factor, supernode, x),
+            1 => backward_narrow::<A, 1>(factor, supernode, x, &mut asked),
+            2 => backward_narrow::<A, 2>(factor, supernode, x, &mut asked),
+            _ => backward::<A, HIGH>(factor, supernode, x, &mut asked),
         }
     }
 }
@@ -183,7 +183,7 @@ fn forward<A: Arithmetic, const HIGH: usize>(factor: &Packed, s: &Supernode, x: 
 
 /// Lᵀ y = D⁻¹ x for the columns of one supernode.
 #[inline(always)]
-fn backward<A: Arithmetic, const HIGH: usize>(factor: &Packed, s: &Supernode, x: &mut [Row]) {
+fn backward<A: Arithmetic, const HIGH: usize>(factor: &Packed, s: &Supernode, x: &mut [Row], asked: &mut Asked) {
     for (row, inverse) in x[s.begin..s.begin + s.width].iter_mut().zip(&factor.inverse[s.begin..]) {
         row.iter_mut().for_each(|x| *x *= inverse);
     }
@@ -191,10 +191,10 @@ fn backward<A: Arithmetic, const HIGH: usize>(factor: &Packed, s: &Supernode, x:
         let columns = (s.width - WIDTH * g).min(WIDTH);
         let mut known = SMALL_ZERO;
         if HIGH == WIDTH && columns > WIDTH / 2 {
-            known = above::<A, 8>(factor, s, g, 0, x);
+            known = above::<A, 8>(factor, s, g, 0, x, asked);
         } else {
             for high in (0..columns).step_by(4) {
-                known[high..high + 4].copy_from_slice(&above::<A, 4>(factor, s, g, high, x)[..4]);
+                known[high..high + 4].copy_from_slice(&above::<A, 4>(factor, s, g, high, x, asked)[..4]);
             }
         }
         let triangle = &factor.values[s.diagonal_start(g) + WIDTH * g..][..columns];
@@ -211,6 +211,7 @@ fn above<A: Arithmetic, const COLUMNS: usize>(
     group: usize,
     high: usize,
     x: &[Row],
+    asked: &mut Asked,
 ) -> [Row; COLUMNS] {
     let mut sum = [ZERO; COLUMNS];
     let column = WIDTH * group + high;
@@ -229,7 +230,9 @@ fn above<A: Arithmetic, const COLUMNS: usize>(
                 add_scaled::<A>(&mut sum[q], l[q][r], x);
             }
         }
+        asked.some(factor, COLUMNS);
     }
+    asked.some(factor, 2 * COLUMNS);
     for g in group + 1..s.width.div_ceil(WIDTH) {
         let l = &factor.values[s.diagonal_start(g) + column..][..COLUMNS];
         let rows = (s.width - WIDTH * g).min(WIDTH);
@@ -253,20 +256,29 @@ fn prefetch_forward(factor: &Packed, at: usize, tail: &[Row], first: usize) {
 /// Down to where the second sweep has asked for what it will read.
 struct Asked {
     values: usize,
+    /// How far down it may ask by now.
+    until: usize,
     rows: usize,
 }
 
 impl Asked {
-    /// Asks for what comes soon after a supernode.
+    /// Asks for rows of x that come soon after a supernode, and allows to ask for its values.
     #[inline(always)]
     fn go_on(&mut self, factor: &Packed, s: &Supernode, x: &[Row]) {
-        let until = s.diagonal.saturating_sub(AHEAD);
-        (until..self.values.min(s.diagonal)).rev().for_each(|line| prefetch(&factor.values, line));
-        self.values = until;
+        self.values = self.values.min(s.diagonal);
+        self.until = s.diagonal.saturating_sub(AHEAD);
         let until = s.rows.saturating_sub(ROWS_AHEAD);
         let rows = &factor.layout.rows[until..self.rows.min(s.rows).max(until)];
         rows.iter().rev().for_each(|&row| prefetch(x, row as usize));
         self.rows = until;
+    }
+
+    /// Asks for some of the values, so that products with others go on meanwhile.
+    #[inline(always)]
+    fn some(&mut self, factor: &Packed, lines: usize) {
+        let until = self.values.saturating_sub(lines).max(self.until).min(self.values);
+        (until..self.values).for_each(|line| prefetch(&factor.values, line));
+        self.values = until;
     }
 }
 
@@ -298,10 +310,12 @@ fn forward_narrow<A: Arithmetic, const W: usize>(factor: &Packed, s: &Supernode,
 
 /// [`backward`] for a supernode of one or two columns.
 #[inline(always)]
-fn backward_narrow<A: Arithmetic, const W: usize>(factor: &Packed, s: &Supernode, x: &mut [Row]) {
+fn backward_narrow<A: Arithmetic, const W: usize>(factor: &Packed, s: &Supernode, x: &mut [Row], asked: &mut Asked) {
+    asked.some(factor, W);
     // Several sums, because each addition waits for the one before it.
     let mut sums = [[ZERO; 4]; W];
     for g in 0..s.groups {
+        asked.some(factor, W);
         let l = &factor.values[s.below + g * W..][..W];
         let rows = &factor.layout.rows[s.rows + WIDTH * g..][..WIDTH];
         for r in 0..WIDTH {
