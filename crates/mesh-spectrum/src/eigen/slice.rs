@@ -452,3 +452,17 @@ fn add(x: &mut [Row], y: &[Row], c: f64) {
 pub(crate) fn norm(matrix: &Csr) -> f64 {
     (0..matrix.rows()).map(|row| matrix.row(row).map(|(_, value)| value.abs()).sum()).fold(0.0, f64::max)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_start_where_the_slice_before_ends() {
+        let eigenvalues: Vec<f64> = (1..=7).map(f64::from).collect();
+        let rows = columns(&eigenvalues, 6, 0.0);
+        assert_eq!(rows, [[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 2.0], [3.0, 4.0, 5.0, 6.0, 7.0, 0.0, 0.0, 0.0]]);
+        assert_eq!(columns(&eigenvalues, 0, 0.0), [[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 0.0]]);
+        assert_eq!(columns(&eigenvalues[..2], 6, 0.0).len(), 1, "a slice may end in the block that it starts in");
+    }
+}
