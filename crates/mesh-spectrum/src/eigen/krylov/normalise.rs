@@ -1,6 +1,7 @@
 //! Making the columns of a new block of a Krylov space orthonormal, however little is left of them.
 
-use super::{Krylov, Product, Whole};
+use super::Krylov;
+use super::take::{Product, Whole};
 use crate::eigen::block::{Block, Row, SMALL_ZERO, Small, WIDTH, ZERO, cholesky, inverse_of_upper, product};
 use crate::eigen::loss::uniform;
 use crate::eigen::parts::{self, gram_of};
