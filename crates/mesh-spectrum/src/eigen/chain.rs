@@ -186,21 +186,21 @@ pub(crate) fn chain(
 
 /// Writes a slice's vectors behind `done` others. Result: their residuals.
 fn vectors(tools: &Tools, slice: &Slice, done: usize, blocks: &mut [&mut [Row]]) -> Result<Vec<f64>, Trouble> {
-    let (first, lead) = (done / WIDTH, done % WIDTH);
+    let (first, skip) = (done / WIDTH, done % WIDTH);
     let end = (done + slice.eigenvalues.len()).div_ceil(WIDTH);
     let own = &mut blocks[first..end];
     let [shared, rest @ ..] = own else { return Ok(Vec::new()) };
-    if lead == 0 {
-        return slice.vectors(tools, lead, own);
+    if skip == 0 {
+        return slice.vectors(tools, skip, own);
     }
     // The slice before has columns in the first block.
     let n = shared.len();
     let mut apart = tools.pool.take(n + 1);
     let mut into: Vec<&mut [Row]> =
         [&mut apart[..n]].into_iter().chain(rest.iter_mut().map(|block| &mut **block)).collect();
-    let residuals = slice.vectors(tools, lead, &mut into);
+    let residuals = slice.vectors(tools, skip, &mut into);
     if residuals.is_ok() {
-        shared.iter_mut().zip(&apart[..n]).for_each(|(to, from)| to[lead..].copy_from_slice(&from[lead..]));
+        shared.iter_mut().zip(&apart[..n]).for_each(|(to, from)| to[skip..].copy_from_slice(&from[skip..]));
     }
     tools.pool.give([apart]);
     residuals

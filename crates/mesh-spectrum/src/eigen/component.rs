@@ -238,18 +238,15 @@ impl Component {
         progress.expect_slices(spans.iter().map(|span| slices_expected(self.rows(), span.end - span.first)).sum());
 
         let n = self.rows();
-        let needed: Vec<usize> = spans.iter().map(|span| (span.end - span.first).div_ceil(WIDTH)).collect();
-        let mut vectors = Block::zeros(n * needed.iter().sum::<usize>());
+        let blocks_of = |span: &Span| (span.end - span.first).div_ceil(WIDTH);
+        let mut vectors = Block::zeros(n * spans.iter().map(blocks_of).sum::<usize>());
         let mut blocks: Vec<&mut [Row]> = vectors.chunks_exact_mut(n).collect();
-        let mut shares = Vec::new();
-        let (mut rest, mut starts) = (&mut blocks[..], Vec::new());
-        for (span, needed) in spans.iter().zip(&needed) {
-            starts.push(
-                starts
-                    .last()
-                    .map_or(0, |start| start + WIDTH * shares.last().map_or(0, |(_, own): &(_, &mut [_])| own.len())),
-            );
-            let (own, after) = rest.split_at_mut(*needed);
+        let (mut shares, mut starts) = (Vec::new(), Vec::new());
+        let (mut rest, mut start) = (&mut blocks[..], 0);
+        for span in &spans {
+            let (own, after) = rest.split_at_mut(blocks_of(span));
+            starts.push(start);
+            start += WIDTH * own.len();
             shares.push((*span, own));
             rest = after;
         }

@@ -384,17 +384,17 @@ impl<'a> Krylov<'a> {
         self.tools.progress.clock.time(Step::Project, || self.projected.ritz(self.dimension()))
     }
 
-    /// Ritz vectors of the chosen columns into blocks of eight, from column `lead` of the first one on (the others are
+    /// Ritz vectors of the chosen columns into blocks of eight, from column `skip` of the first one on (the others are
     /// zero), with one step of inverse iteration that costs no solve: x = B s + Q_{m+1} R s_last / θ is Op B s / θ, so that
     /// the residual (A − λ) x is β (λ − σ)², free of the factor ‖A‖.
     pub(crate) fn vectors(
         &self,
         ritz: &Ritz,
         chosen: &[usize],
-        lead: usize,
+        skip: usize,
         into: &mut [&mut [Row]],
     ) -> Result<(), EigenError> {
-        self.combine(ritz, chosen, lead, true, into)
+        self.combine(ritz, chosen, skip, true, into)
     }
 
     /// Takes off coefficients along so many blocks what the blocks have in common.
@@ -416,14 +416,14 @@ impl<'a> Krylov<'a> {
         &self,
         ritz: &Ritz,
         chosen: &[usize],
-        lead: usize,
+        skip: usize,
         inverse_step: bool,
         into: &mut [&mut [Row]],
     ) -> Result<(), EigenError> {
         let used = self.dimension() / WIDTH + usize::from(inverse_step);
-        let mut c = coefficients(ritz, chosen, lead, used);
+        let mut c = coefficients(ritz, chosen, skip, used);
         if inverse_step {
-            for (place, &column) in (lead..).zip(chosen) {
+            for (place, &column) in (skip..).zip(chosen) {
                 for (a, x) in ritz.couplings[column].iter().enumerate() {
                     c[place / WIDTH * used + used - 1][a][place % WIDTH] = x / ritz.values[column];
                 }
@@ -468,11 +468,11 @@ impl<'a> Krylov<'a> {
     }
 }
 
-/// The coefficients of Ritz vectors, after `lead` columns of zeros, along so many blocks of a basis, a block's after
+/// The coefficients of Ritz vectors, after `skip` columns of zeros, along so many blocks of a basis, a block's after
 /// another's.
-fn coefficients(ritz: &Ritz, chosen: &[usize], lead: usize, blocks: usize) -> Vec<Small> {
-    let mut c = vec![SMALL_ZERO; blocks * (lead + chosen.len()).div_ceil(WIDTH)];
-    for (place, &column) in (lead..).zip(chosen) {
+fn coefficients(ritz: &Ritz, chosen: &[usize], skip: usize, blocks: usize) -> Vec<Small> {
+    let mut c = vec![SMALL_ZERO; blocks * (skip + chosen.len()).div_ceil(WIDTH)];
+    for (place, &column) in (skip..).zip(chosen) {
         let (c, to) = (&mut c[place / WIDTH * blocks..][..blocks], place % WIDTH);
         for (from, value) in ritz.vectors.col(column).iter().enumerate() {
             c[from / WIDTH][from % WIDTH][to] = *value;

@@ -20,35 +20,33 @@ pub(crate) fn large(bytes: usize) -> usize {
     if cfg!(target_os = "linux") && bytes >= WORTH { PAGE } else { 0 }
 }
 
-/// Asks the system to put entries from `offset` on, which start a large page, into such pages. A hint, which may do nothing.
-#[cfg(target_os = "linux")]
-pub(crate) fn advise(memory: &[f64], offset: usize) {
-    let Some(entries) = memory.get(offset..) else { return };
-    let bytes = size_of_val(entries) / PAGE * PAGE;
-    // SAFETY: the range is whole pages inside memory that is borrowed here, and MADV_HUGEPAGE changes neither what is in
-    // it nor who may use it.
-    let _ = unsafe { libc::madvise(entries.as_ptr().cast_mut().cast(), bytes, libc::MADV_HUGEPAGE) };
-}
-
-#[cfg(not(target_os = "linux"))]
-pub(crate) fn advise(_: &[f64], _: usize) {}
-
-/// Bytes of an ordinary page, where that is what the system has; elsewhere the call below fails and does nothing.
+/// Bytes of an ordinary page, where that is what the system has; elsewhere asking for them fails and does nothing.
 const ORDINARY: usize = 4096;
 
-/// Asks the system for the pages of memory that is about to be written to, all at once. A hint, which may do nothing.
-#[cfg(target_os = "linux")]
-pub(crate) fn touch(rows: &mut [Row]) {
-    let entries = rows.as_flattened_mut();
-    let before = entries.as_ptr().align_offset(ORDINARY).min(entries.len());
-    let whole = &mut entries[before..];
-    let length = size_of_val(whole) / ORDINARY * ORDINARY;
-    if length > 0 {
-        // SAFETY: the range is whole pages inside memory that is borrowed mutably here, and MADV_POPULATE_WRITE changes
-        // nothing that is in it.
-        let _ = unsafe { libc::madvise(whole.as_mut_ptr().cast(), length, libc::MADV_POPULATE_WRITE) };
-    }
+/// Asks the system to put entries from `offset` on, which start a large page, into such pages. A hint, which may do nothing.
+pub(crate) fn advise(memory: &[f64], offset: usize) {
+    #[cfg(target_os = "linux")]
+    tell(memory.get(offset..).unwrap_or_default(), PAGE, libc::MADV_HUGEPAGE);
+    #[cfg(not(target_os = "linux"))]
+    let _ = (memory, offset, PAGE);
 }
 
-#[cfg(not(target_os = "linux"))]
-pub(crate) fn touch(_: &mut [Row]) {}
+/// Asks the system for the pages of memory that is about to be written to, all at once. A hint, which may do nothing.
+pub(crate) fn touch(rows: &mut [Row]) {
+    #[cfg(target_os = "linux")]
+    tell(rows.as_flattened(), ORDINARY, libc::MADV_POPULATE_WRITE);
+    #[cfg(not(target_os = "linux"))]
+    let _ = (rows, ORDINARY);
+}
+
+/// Gives the system advice about the whole pages of so many bytes in a piece of memory.
+#[cfg(target_os = "linux")]
+fn tell(memory: &[f64], page: usize, advice: libc::c_int) {
+    let whole = &memory[memory.as_ptr().align_offset(page).min(memory.len())..];
+    let bytes = size_of_val(whole) / page * page;
+    if bytes > 0 {
+        // SAFETY: the range is whole pages inside memory that is borrowed here, and neither MADV_HUGEPAGE nor
+        // MADV_POPULATE_WRITE, the two that are given, changes what is in it or who may use it.
+        let _ = unsafe { libc::madvise(whole.as_ptr().cast_mut().cast(), bytes, advice) };
+    }
+}

@@ -267,21 +267,21 @@ impl Slice<'_> {
         self.beyond.iter().map(|&k| self.factor.shift + 1.0 / self.ritz.values[k]).collect()
     }
 
-    /// Writes the vectors into blocks of eight, from column `lead` of the first one on (the others are zero), and makes
+    /// Writes the vectors into blocks of eight, from column `skip` of the first one on (the others are zero), and makes
     /// their residuals small. Result: ‖A x − λ x‖ of each.
-    pub(crate) fn vectors(&self, tools: &Tools, lead: usize, into: &mut [&mut [Row]]) -> Result<Vec<f64>, Trouble> {
+    pub(crate) fn vectors(&self, tools: &Tools, skip: usize, into: &mut [&mut [Row]]) -> Result<Vec<f64>, Trouble> {
         tools.progress.clock.time(Step::Vectors, || {
             into.iter_mut().for_each(|block| pages::touch(block));
-            self.space.vectors(&self.ritz, &self.chosen, lead, into)?;
-            self.settle(tools, lead, into)
+            self.space.vectors(&self.ritz, &self.chosen, skip, into)?;
+            self.settle(tools, skip, into)
         })
     }
 
     /// Makes the residuals of vectors small, where they are not; returns them.
-    fn settle(&self, tools: &Tools, lead: usize, into: &mut [&mut [Row]]) -> Result<Vec<f64>, Trouble> {
+    fn settle(&self, tools: &Tools, skip: usize, into: &mut [&mut [Row]]) -> Result<Vec<f64>, Trouble> {
         let n = tools.matrix.rows();
         let allowed = tools.allowed();
-        let shifts: Vec<Row> = columns(&self.eigenvalues, lead, 0.0);
+        let shifts: Vec<Row> = columns(&self.eigenvalues, skip, 0.0);
         let mut residuals: Vec<Row> =
             into.par_iter().zip(&shifts).map(|(x, shifts)| tools.residuals(x, shifts)).collect();
         let mut remedies = REMEDIES.iter();
@@ -291,7 +291,7 @@ impl Slice<'_> {
             let most = residuals.iter().map(largest).fold(0.0, larger);
             if most <= allowed {
                 tools.pool.give(beyond);
-                return Ok(residuals.concat()[lead..][..self.eigenvalues.len()].to_vec());
+                return Ok(residuals.concat()[skip..][..self.eigenvalues.len()].to_vec());
             }
             let Some(remedy) = remedies.next().filter(|_| most.is_finite()) else {
                 return Err(Trouble::Again(format!("residual {most:e}, {allowed:e} allowed")));
@@ -307,7 +307,7 @@ impl Slice<'_> {
                 for b in 0..into.len() {
                     if largest(&residuals[b]) > allowed {
                         tools.progress.go_on()?;
-                        residuals[b] = self.purge(tools, (b, lead), into, &beyond, &shifts[b], &residuals[b])?;
+                        residuals[b] = self.purge(tools, (b, skip), into, &beyond, &shifts[b], &residuals[b])?;
                     }
                 }
                 continue;
@@ -346,7 +346,7 @@ impl Slice<'_> {
     fn purge(
         &self,
         tools: &Tools,
-        (b, lead): (usize, usize),
+        (b, skip): (usize, usize),
         into: &mut [&mut [Row]],
         beyond: &[Block],
         shifts: &Row,
@@ -363,7 +363,7 @@ impl Slice<'_> {
         parts::gram(kind, &others, &[&*r], &mut c);
         let ahead = self.ahead();
         let ahead = &ahead[..ahead.len().min(WIDTH * beyond.len())];
-        let eigenvalues = [columns(&self.eigenvalues, lead, f64::NAN), columns(ahead, 0, f64::NAN)].concat();
+        let eigenvalues = [columns(&self.eigenvalues, skip, f64::NAN), columns(ahead, 0, f64::NAN)].concat();
         for (c, eigenvalues) in c.iter_mut().zip(&eigenvalues) {
             for (row, eigenvalue) in c.iter_mut().zip(eigenvalues) {
                 for k in 0..WIDTH {
@@ -418,11 +418,11 @@ const REMEDIES: [Remedy; 7] =
 /// By how much a step may enlarge a residual, along pairs next to the shift, which a purge takes out again.
 const WORSE_MAX: f64 = 10.0;
 
-/// The eigenvalues of blocks, from column `lead` of the first one on, and something else in the columns without one.
-fn columns(eigenvalues: &[f64], lead: usize, without: f64) -> Vec<Row> {
+/// The eigenvalues of blocks, from column `skip` of the first one on, and something else in the columns without one.
+fn columns(eigenvalues: &[f64], skip: usize, without: f64) -> Vec<Row> {
     let of_column =
-        |column: usize| column.checked_sub(lead).and_then(|k| eigenvalues.get(k)).copied().unwrap_or(without);
-    let blocks = (lead + eigenvalues.len()).div_ceil(WIDTH);
+        |column: usize| column.checked_sub(skip).and_then(|k| eigenvalues.get(k)).copied().unwrap_or(without);
+    let blocks = (skip + eigenvalues.len()).div_ceil(WIDTH);
     (0..blocks).map(|b| std::array::from_fn(|k| of_column(WIDTH * b + k))).collect()
 }
 

@@ -232,7 +232,7 @@ fn above<A: Arithmetic, const COLUMNS: usize>(
         }
         asked.some(factor, COLUMNS);
     }
-    asked.some(factor, 2 * COLUMNS);
+    asked.some(factor, 2 * COLUMNS); // as many again for the diagonal block
     for g in group + 1..s.width.div_ceil(WIDTH) {
         let l = &factor.values[s.diagonal_start(g) + column..][..COLUMNS];
         let rows = (s.width - WIDTH * g).min(WIDTH);
