@@ -8,9 +8,10 @@
 //! A front is column-major, only its lower triangle is used. Its columns take the first places, filled up to a multiple
 //! of eight, so that the rows below start at a cache line and products run over whole tiles of 8 × 8.
 
-use crate::eigen::block::{Row, WIDTH, ZERO};
+use crate::eigen::arithmetic::Arithmetic;
+use crate::eigen::block::{Row, SMALL_ZERO, WIDTH, ZERO};
 use crate::eigen::factor::Pivots;
-use crate::eigen::kernel::{Arithmetic, outer};
+use crate::eigen::kernel::{at_once, in_groups, outer};
 use crate::eigen::solve::{Layout, Packed, Supernode};
 use crate::operator::Csr;
 
@@ -296,18 +297,13 @@ fn update<A: Arithmetic, const HIGH: usize, const P: usize>(
     let of_panel = |g: usize| &panel[g * columns..][..columns];
     for h in 0..groups {
         let right = &scaled[h * columns..][..columns];
-        let mut g = h;
-        while g + P <= groups {
-            let tiles = outer::<A, HIGH, P>(right, std::array::from_fn(|p| of_panel(g + p)));
+        in_groups!(P, groups - h, g, N => {
+            let mut tiles = [SMALL_ZERO; N];
+            outer::<A, HIGH, N>(right, std::array::from_fn(|p| of_panel(h + g + p)), &mut tiles);
             for (p, tile) in tiles.iter().enumerate() {
-                subtract(front, side, rest + WIDTH * (g + p), rest + WIDTH * h, tile);
+                subtract(front, side, rest + WIDTH * (h + g + p), rest + WIDTH * h, tile);
             }
-            g += P;
-        }
-        for g in g..groups {
-            let [tile] = outer::<A, HIGH, 1>(right, [of_panel(g)]);
-            subtract(front, side, rest + WIDTH * g, rest + WIDTH * h, &tile);
-        }
+        });
     }
 }
 

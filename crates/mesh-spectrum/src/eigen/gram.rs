@@ -13,6 +13,9 @@ use crate::eigen::{EigenError, Progress};
 /// Rows of all blocks that are multiplied with one another at once: with a thousand pairs they fill half of a core's cache.
 const TOGETHER: usize = PANEL / 2;
 
+/// Columns of blocks that are multiplied with all others at once: as many as the kernel takes.
+const COLUMNS: usize = 3;
+
 /// The larger of two numbers; not a number, if one is not.
 pub(crate) fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || a > b { a } else { b }
@@ -65,13 +68,13 @@ pub(crate) struct Gram {
 impl Gram {
     pub(crate) fn of(blocks: &[&mut [Row]], kind: Kind, progress: &Progress) -> Result<Gram, EigenError> {
         let count = blocks.len();
-        let starts: Vec<usize> = (0..count).step_by(2).collect();
+        let starts: Vec<usize> = (0..count).step_by(COLUMNS).collect();
         let mut parts = vec![SMALL_ZERO; count * (count + 1) / 2];
-        // Two columns of blocks at a time, down to the diagonal.
-        let pair = |i: usize| (i..(i + 2).min(count), (i + 2).min(count));
-        for (i, of_pair) in starts.iter().zip(products(blocks, &starts, pair, kind, progress)?) {
-            let (columns, end) = pair(*i);
-            for (i, out) in columns.zip(of_pair.chunks_exact(end)) {
+        // Some columns of blocks at a time, down to the diagonal.
+        let group = |i: usize| (i..(i + COLUMNS).min(count), (i + COLUMNS).min(count));
+        for (i, of_group) in starts.iter().zip(products(blocks, &starts, group, kind, progress)?) {
+            let (columns, end) = group(*i);
+            for (i, out) in columns.zip(of_group.chunks_exact(end)) {
                 parts[i * (i + 1) / 2..][..i + 1].copy_from_slice(&out[..i + 1]);
             }
         }
@@ -91,11 +94,11 @@ impl Gram {
             *self = Gram::of(blocks, kind, progress)?;
             return Ok(());
         }
-        // Two neighbours at a time, where both have changed.
+        // Neighbours at a time, where they have changed.
         let mut runs: Vec<Range<usize>> = Vec::new();
         for &i in changed {
             match runs.last_mut() {
-                Some(run) if run.end == i && run.len() == 1 => run.end += 1,
+                Some(run) if run.end == i && run.len() < COLUMNS => run.end += 1,
                 _ => runs.push(i..i + 1),
             }
         }

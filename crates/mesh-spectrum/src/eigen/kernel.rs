@@ -6,7 +6,14 @@
 //! Tall blocks do not fit in any cache, so every product reads each of them once, panel by panel, for as many columns
 //! as the registers hold; the lines that come next are asked for ahead of time.
 
-use crate::eigen::block::{Row, SMALL_ZERO, Small, WIDTH, ZERO, add};
+use std::ops::Range;
+
+#[cfg(target_arch = "aarch64")]
+use crate::eigen::arithmetic::Fused;
+use crate::eigen::arithmetic::{Arithmetic, Plain};
+#[cfg(target_arch = "x86_64")]
+use crate::eigen::arithmetic::{Avx2, Avx512};
+use crate::eigen::block::{Row, SMALL_ZERO, Small, WIDTH, ZERO, add, transpose};
 use crate::eigen::factor::Pivots;
 use crate::eigen::front::{Tree, Workspace, factor_with};
 use crate::eigen::polish::{Levels, chebyshev_with};
@@ -53,42 +60,6 @@ impl Kind {
     }
 }
 
-/// How a product and a sum are rounded.
-pub(crate) trait Arithmetic {
-    /// a·b + c.
-    fn fma(a: f64, b: f64, c: f64) -> f64;
-    /// The same in single precision.
-    fn fma_single(a: f32, b: f32, c: f32) -> f32;
-}
-
-/// Two roundings: any processor.
-pub(crate) struct Plain;
-
-/// One rounding: processors with a fused instruction.
-pub(crate) struct Fused;
-
-impl Arithmetic for Plain {
-    #[inline(always)]
-    fn fma(a: f64, b: f64, c: f64) -> f64 {
-        a * b + c
-    }
-    #[inline(always)]
-    fn fma_single(a: f32, b: f32, c: f32) -> f32 {
-        a * b + c
-    }
-}
-
-impl Arithmetic for Fused {
-    #[inline(always)]
-    fn fma(a: f64, b: f64, c: f64) -> f64 {
-        a.mul_add(b, c)
-    }
-    #[inline(always)]
-    fn fma_single(a: f32, b: f32, c: f32) -> f32 {
-        a.mul_add(b, c)
-    }
-}
-
 /// c += a·b for a row.
 #[inline(always)]
 pub(crate) fn add_scaled<A: Arithmetic>(c: &mut Row, a: f64, b: &Row) {
@@ -116,31 +87,73 @@ pub(crate) const PANEL: usize = 256;
 /// How far ahead of its use a block's row is asked for.
 const AHEAD: usize = 64;
 
-/// Qᵀ W_p for P blocks at once, HIGH columns of Q at once.
+/// How many of so many blocks to take at once: P at most, and none alone that need not be. P is 1 or 3.
 #[inline(always)]
-pub(crate) fn outer<A: Arithmetic, const HIGH: usize, const P: usize>(q: &[Row], w: [&[Row]; P]) -> [Small; P] {
+pub(crate) const fn at_once<const P: usize>(left: usize) -> usize {
+    match left {
+        _ if P == 1 => 1,
+        1 => 1,
+        2 | 4 => 2,
+        _ => 3,
+    }
+}
+
+/// Goes through so many blocks, up to P at once: `$body` for the blocks from number `$first` on, N of them.
+macro_rules! in_groups {
+    ($p:ident, $count:expr, $first:ident, $n:ident => $body:block) => {
+        let mut $first = 0;
+        while $first < $count {
+            let taken = at_once::<$p>($count - $first);
+            match taken {
+                3 => {
+                    const $n: usize = 3;
+                    $body
+                }
+                2 => {
+                    const $n: usize = 2;
+                    $body
+                }
+                _ => {
+                    const $n: usize = 1;
+                    $body
+                }
+            }
+            $first += taken;
+        }
+    };
+}
+pub(crate) use in_groups;
+
+/// out_p += Qᵀ W_p for P blocks, HIGH columns of Q at once: an entry of Q, once read, serves all blocks.
+#[inline(always)]
+pub(crate) fn outer<A: Arithmetic, const HIGH: usize, const P: usize>(q: &[Row], w: [&[Row]; P], out: &mut [Small; P]) {
     let rows = q.len();
     let w = w.map(|w| &w[..rows]);
-    let mut out = [SMALL_ZERO; P];
     for high in (0..WIDTH).step_by(HIGH) {
-        let mut sum = [[ZERO; HIGH]; P];
-        for i in 0..rows {
-            if high == 0 {
-                prefetch(q, i + AHEAD);
+        let mut sum = [[A::splat(0.0); HIGH]; P];
+        for p in 0..P {
+            for a in 0..HIGH {
+                sum[p][a] = A::load(&out[p][high + a]);
             }
-            // A copy of each row, and vectors outermost: otherwise the compiler takes the wrong loop for the lanes.
+        }
+        let mut of_row = [A::splat(0.0); P];
+        for i in 0..rows {
             for p in 0..P {
-                let w = w[p][i];
-                for a in 0..HIGH {
-                    add_scaled::<A>(&mut sum[p][a], q[i][high + a], &w);
+                of_row[p] = A::load(&w[p][i]);
+            }
+            for a in 0..HIGH {
+                let entry = A::splat(q[i][high + a]);
+                for p in 0..P {
+                    sum[p][a] = A::multiply_add(entry, of_row[p], sum[p][a]);
                 }
             }
         }
         for p in 0..P {
-            out[p][high..high + HIGH].copy_from_slice(&sum[p]);
+            for a in 0..HIGH {
+                A::store(sum[p][a], &mut out[p][high + a]);
+            }
         }
     }
-    out
 }
 
 /// out[i·blocks + k] += Q_kᵀ W_i; the first block decides how many rows there are.
@@ -153,19 +166,14 @@ fn gram_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>(
     let rows = blocks.first().map_or(0, |block| block.len());
     for first in (0..rows).step_by(PANEL) {
         let panel = first..(first + PANEL).min(rows);
-        for (k, block) in blocks.iter().enumerate() {
-            let q = &block[panel.clone()];
-            let mut i = 0;
-            while i + P <= ws.len() {
-                let part = outer::<A, HIGH, P>(q, std::array::from_fn(|p| &ws[i + p][panel.clone()]));
+        in_groups!(P, ws.len(), i, N => {
+            let w: [&[Row]; N] = std::array::from_fn(|p| &ws[i + p][panel.clone()]);
+            for (k, block) in blocks.iter().enumerate() {
+                let mut part = [SMALL_ZERO; N];
+                outer::<A, HIGH, N>(&block[panel.clone()], w, &mut part);
                 part.iter().enumerate().for_each(|(p, part)| add(&mut out[(i + p) * blocks.len() + k], part));
-                i += P;
             }
-            for i in i..ws.len() {
-                let [part] = outer::<A, HIGH, 1>(q, [&ws[i][panel.clone()]]);
-                add(&mut out[i * blocks.len() + k], &part);
-            }
-        }
+        });
     }
 }
 
@@ -178,25 +186,54 @@ fn tile<A: Arithmetic, const R: usize, const P: usize>(
     at: usize,
     add: bool,
 ) {
-    let mut sum = [[ZERO; R]; P];
+    let mut sum = [[A::splat(0.0); R]; P];
     if add {
         for p in 0..P {
-            sum[p].copy_from_slice(&w[p][at..at + R]);
+            for r in 0..R {
+                sum[p][r] = A::load(&w[p][at + r]);
+            }
         }
     }
+    let mut of_row = [A::splat(0.0); P];
     for (k, block) in blocks.iter().enumerate() {
-        (0..R).for_each(|r| prefetch(block, at + AHEAD + r));
+        for r in 0..R {
+            prefetch(block, at + AHEAD + r);
+        }
         let q = &block[at..at + R];
         for a in 0..WIDTH {
+            for p in 0..P {
+                of_row[p] = A::load(&c[p][k][a]);
+            }
             for r in 0..R {
+                let entry = A::splat(q[r][a]);
                 for p in 0..P {
-                    add_scaled::<A>(&mut sum[p][r], q[r][a], &c[p][k][a]);
+                    sum[p][r] = A::multiply_add(entry, of_row[p], sum[p][r]);
                 }
             }
         }
     }
     for p in 0..P {
-        w[p][at..at + R].copy_from_slice(&sum[p]);
+        for r in 0..R {
+            A::store(sum[p][r], &mut w[p][at + r]);
+        }
+    }
+}
+
+/// The same for a range of rows.
+#[inline(always)]
+fn tiles<A: Arithmetic, const R: usize, const P: usize>(
+    blocks: &[&[Row]],
+    c: [&[Small]; P],
+    w: &mut [&mut [Row]; P],
+    rows: Range<usize>,
+    add: bool,
+) {
+    let whole = rows.end - rows.len() % R;
+    for at in (rows.start..whole).step_by(R) {
+        tile::<A, R, P>(blocks, c, w, at, add);
+    }
+    for at in whole..rows.end {
+        tile::<A, 1, P>(blocks, c, w, at, add);
     }
 }
 
@@ -211,93 +248,18 @@ fn update_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>
     let rows = blocks.first().map_or(0, |block| block.len());
     let panel = PANEL / 4; // a multiple of R
     for first in (0..rows).step_by(panel) {
-        let end = (first + panel).min(rows);
-        let mut c = c.chunks_exact(blocks.len());
-        let mut several = ws.chunks_exact_mut(P);
-        for ws in &mut several {
-            let c: [&[Small]; P] = std::array::from_fn(|_| c.next().unwrap_or_default());
-            let Ok(ws) = <&mut [&mut [Row]; P]>::try_from(ws) else { continue };
-            let whole = end - (end - first) % R;
-            for at in (first..whole).step_by(R) {
-                tile::<A, R, P>(blocks, c, ws, at, add);
+        let panel = first..(first + panel).min(rows);
+        in_groups!(P, ws.len(), i, N => {
+            let c: [&[Small]; N] = std::array::from_fn(|p| &c[(i + p) * blocks.len()..][..blocks.len()]);
+            if let Some(ws) = ws[i..].first_chunk_mut::<N>() {
+                tiles::<A, R, N>(blocks, c, ws, panel.clone(), add);
             }
-            for at in whole..end {
-                tile::<A, 1, P>(blocks, c, ws, at, add);
-            }
-        }
-        for (w, c) in several.into_remainder().iter_mut().zip(c) {
-            let ws = std::array::from_mut(w);
-            let whole = end - (end - first) % R;
-            for at in (first..whole).step_by(R) {
-                tile::<A, R, 1>(blocks, [c], ws, at, add);
-            }
-            for at in whole..end {
-                tile::<A, 1, 1>(blocks, [c], ws, at, add);
-            }
-        }
+        });
     }
 }
 
-/// Columns of Q at once for two W's: the registers hold as many sums as for one W and all columns.
-const HALF: usize = WIDTH / 2;
-
-/// out_p += Qᵀ W_p for R rows, of which the W's are at hand: an entry of Q, once read, serves all.
-#[inline(always)]
-fn outer_of_few<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>(
-    q: &[Row],
-    w: [&[Row; R]; P],
-    out: [&mut Small; P],
-) {
-    for high in (0..WIDTH).step_by(HIGH) {
-        let mut sum = [[ZERO; HIGH]; P];
-        for p in 0..P {
-            sum[p].copy_from_slice(&out[p][high..high + HIGH]);
-        }
-        for r in 0..R {
-            for a in 0..HIGH {
-                for p in 0..P {
-                    add_scaled::<A>(&mut sum[p][a], q[r][high + a], &w[p][r]);
-                }
-            }
-        }
-        for p in 0..P {
-            out[p][high..high + HIGH].copy_from_slice(&sum[p]);
-        }
-    }
-}
-
-/// What `recur` does for the R rows that start at `at`.
-#[inline(always)]
-fn recur_few<A: Arithmetic, const R: usize, const HIGH: usize>(
-    q: &[&[Row]],
-    c: &[Small],
-    w: &mut [Row],
-    p: &[&[Row]],
-    v: &[Row],
-    out: &mut [Small],
-    at: usize,
-) {
-    tile::<A, R, 1>(q, [c], &mut [&mut *w], at, true);
-    let mut of_w = [ZERO; R];
-    of_w.copy_from_slice(&w[at..at + R]);
-    (0..R).for_each(|r| prefetch(w, at + AHEAD + r));
-    let (with_w, with_v) = out.split_at_mut(p.len() + 1);
-    let mut of_v = [ZERO; R];
-    if !v.is_empty() {
-        of_v.copy_from_slice(&v[at..at + R]);
-    }
-    for (i, p) in p.iter().enumerate() {
-        if q.get(i).is_none_or(|q| q.as_ptr() != p.as_ptr()) {
-            (0..R).for_each(|r| prefetch(p, at + AHEAD + r));
-        }
-        let p = &p[at..at + R];
-        match with_v.get_mut(i) {
-            Some(with_v) => outer_of_few::<A, R, HALF, 2>(p, [&of_w, &of_v], [&mut with_w[i], with_v]),
-            None => outer_of_few::<A, R, HIGH, 1>(p, [&of_w], [&mut with_w[i]]),
-        }
-    }
-    outer_of_few::<A, R, HIGH, 1>(&w[at..at + R], [&of_w], [&mut with_w[p.len()]]);
-}
+/// Rows that `recur` walks together: of all blocks they stay in a core's first cache, nearly.
+const TALL: usize = 64;
 
 /// W += Σ_k Q_k C_k, then out_i = P_iᵀ W and, after them, Wᵀ W and, unless V is empty, P_iᵀ V, in one pass.
 #[inline(always)]
@@ -310,13 +272,31 @@ fn recur_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>(
     out: &mut [Small],
 ) {
     out.fill(SMALL_ZERO);
-    let whole = w.len() - w.len() % R;
-    for at in (0..whole).step_by(R) {
-        recur_few::<A, R, HIGH>(q, c, w, p, v, out, at);
+    let rows = w.len();
+    for first in (0..rows).step_by(TALL) {
+        let panel = first..(first + TALL).min(rows);
+        tiles::<A, R, 1>(q, [c], &mut [&mut *w], panel.clone(), true);
+        let (with_w, with_v) = out.split_at_mut(p.len() + 1);
+        let w = &w[panel.clone()];
+        // Wᵀ P_i instead of P_iᵀ W, so that an entry of W, once read, serves several blocks.
+        in_groups!(P, p.len() + 1, i, N => {
+            let p: [&[Row]; N] = std::array::from_fn(|k| p.get(i + k).map_or(w, |p| &p[panel.clone()]));
+            if let Some(out) = with_w[i..].first_chunk_mut::<N>() {
+                outer::<A, HIGH, N>(w, p, out);
+            }
+        });
+        if v.is_empty() {
+            continue;
+        }
+        let v = &v[panel.clone()];
+        in_groups!(P, p.len(), i, N => {
+            let p: [&[Row]; N] = std::array::from_fn(|k| &p[i + k][panel.clone()]);
+            if let Some(out) = with_v[i..].first_chunk_mut::<N>() {
+                outer::<A, HIGH, N>(v, p, out);
+            }
+        });
     }
-    for at in whole..w.len() {
-        recur_few::<A, 1, HIGH>(q, c, w, p, v, out, at);
-    }
+    out.iter_mut().for_each(|out| *out = transpose(out));
 }
 
 /// W = (W + Σ_k Q_k C_k) S, a copy of it unless that is empty, and its Wᵀ W, in one pass.
@@ -342,8 +322,7 @@ fn scale_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>(
             update_with::<A, R, HIGH, P>(&q_panels, c, &mut [before], true);
         }
         update_with::<A, R, HIGH, 1>(&[before], std::slice::from_ref(s), &mut [w], false);
-        let [part] = outer::<A, HIGH, 1>(w, [w]);
-        add(square, &part);
+        outer::<A, HIGH, 1>(w, [w], std::array::from_mut(square));
         if let Some(copy) = copy.get_mut(panel) {
             copy.copy_from_slice(w);
         }
@@ -409,11 +388,11 @@ macro_rules! dispatched {
             {
                 #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx2,fma")]
                 fn avx512($($arg: $type),*) {
-                    $generic::<Fused, 8, 8, 2>($($arg),*);
+                    $generic::<Avx512, 8, 8, 3>($($arg),*);
                 }
                 #[target_feature(enable = "avx2,fma")]
                 fn avx2($($arg: $type),*) {
-                    $generic::<Fused, 4, 4, 1>($($arg),*);
+                    $generic::<Avx2, 4, 4, 1>($($arg),*);
                 }
                 match kind {
                     // SAFETY: the functions are ordinary safe code; calling them is unsafe only because they use

@@ -18,8 +18,9 @@ use std::ops::Range;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
+use crate::eigen::arithmetic::Plain;
 use crate::eigen::block::{Row, SMALL_ZERO, Small, WIDTH, ZERO, add, largest, negative, transpose};
-use crate::eigen::kernel::{Plain, add_scaled};
+use crate::eigen::kernel::add_scaled;
 use crate::eigen::projected::Projected;
 
 /// Rounding of an inner product of unit vectors.

@@ -8,6 +8,7 @@
 //! vertices), `basis` (the result). `kernel`, `parts` (the same on several threads), `block` and `pages` hold what the
 //! time is spent in. `general` does all of it for a mass that is not diagonal.
 
+mod arithmetic;
 mod assemble;
 mod basis;
 mod block;

@@ -5,8 +5,9 @@
 //! and all products go through the levels together, each a level behind the one before: what they read is still in the
 //! cache (wavefront blocking; Demmel, Hoemmen, Mohiyuddin and Yelick 2008 call it the matrix powers kernel).
 
+use crate::eigen::arithmetic::Arithmetic;
 use crate::eigen::block::{Row, WIDTH, ZERO};
-use crate::eigen::kernel::{self, Arithmetic, Kind, add_residual, prefetch, sparse_row};
+use crate::eigen::kernel::{self, Kind, add_residual, prefetch, sparse_row};
 use crate::eigen::order::permuted;
 use crate::operator::Csr;
 

@@ -1,7 +1,7 @@
 //! What is added to vectors and is small is computed in single precision: twice as fast, and exact enough.
 
+use crate::eigen::arithmetic::Arithmetic;
 use crate::eigen::block::{Row, WIDTH};
-use crate::eigen::kernel::Arithmetic;
 
 /// A row of a block, and an 8 × 16 matrix for two blocks, in single precision.
 pub(crate) type SingleRow = [f32; WIDTH];

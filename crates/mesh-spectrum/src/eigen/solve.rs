@@ -6,8 +6,9 @@
 
 use std::sync::Arc;
 
+use crate::eigen::arithmetic::Arithmetic;
 use crate::eigen::block::{Block, Row, SMALL_ZERO, Small, WIDTH, ZERO};
-use crate::eigen::kernel::{Arithmetic, add_scaled, prefetch};
+use crate::eigen::kernel::{add_scaled, prefetch};
 
 /// Columns `begin..begin + width` of L, which share the rows below them.
 pub(crate) struct Supernode {
