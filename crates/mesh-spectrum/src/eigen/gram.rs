@@ -165,25 +165,31 @@ impl Gram {
         (0..self.blocks.div_ceil(2)).into_par_iter().map(of_pair).collect()
     }
 
-    /// (I + C)ᵀ VᵀV (I + C), what VᵀV becomes, from what was measured before: exact to rounding.
+    /// (I + C)ᵀ G (I + C), what G = VᵀV becomes, from what was measured before: exact to rounding.
     pub(crate) fn follow(&mut self, couplings: &[Couplings]) {
         let side = WIDTH * self.blocks;
-        let mut full: Vec<Vec<f64>> = (0..side).map(|b| (0..side).map(|a| self.entry(a, b)).collect()).collect();
+        // G C, of which few columns are not zero.
+        let mut along: Vec<Option<Vec<f64>>> = vec![None; side];
         let entries: Vec<(usize, usize, f64)> = couplings.iter().flat_map(Couplings::entries).collect();
-        let before = full.clone();
         for &(from, to, value) in &entries {
-            full[to].iter_mut().zip(&before[from]).for_each(|(to, from)| *to += value * from);
+            let column = along[to].get_or_insert_with(|| vec![0.0; side]);
+            column.iter_mut().enumerate().for_each(|(row, sum)| *sum += value * self.entry(row, from));
         }
-        for column in &mut full {
-            let before = column.clone();
-            entries.iter().for_each(|&(from, to, value)| column[to] += value * before[from]);
+        for (to, column) in along.iter().enumerate() {
+            let Some(column) = column else { continue };
+            let mut change = column.clone();
+            change[to] *= 2.0; // of G C and of its mirror image
+            // And Cᵀ G C, of which a half is enough.
+            let halved = entries.iter().filter(|&&(_, row, _)| row <= to);
+            halved.for_each(|&(from, row, value)| change[row] += value * column[from]);
+            change.iter().enumerate().for_each(|(row, change)| *self.entry_mut(row, to) += change);
         }
-        for i in 0..self.blocks {
-            for k in 0..=i {
-                self.parts[i * (i + 1) / 2 + k] =
-                    std::array::from_fn(|a| std::array::from_fn(|c| full[WIDTH * i + c][WIDTH * k + a]));
-            }
-        }
+    }
+
+    fn entry_mut(&mut self, a: usize, b: usize) -> &mut f64 {
+        let (a, b) = (a.min(b), a.max(b));
+        let (k, i) = (a / WIDTH, b / WIDTH);
+        &mut self.parts[i * (i + 1) / 2 + k][a % WIDTH][b % WIDTH]
     }
 }
 

@@ -19,6 +19,7 @@ use crate::eigen::front::{Tree, Workspace, factor_with};
 use crate::eigen::polish::{Levels, chebyshev_with};
 use crate::eigen::single::{SingleRow, SingleSmall, correct_with};
 use crate::eigen::solve::{Packed, solve_with};
+use crate::eigen::tridiagonal::{Reflected, Rotations, reflect_with, turn_with};
 use crate::operator::Csr;
 
 /// What the processor can do.
@@ -177,23 +178,14 @@ fn gram_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>(
     }
 }
 
-/// Rows `at..at + R` of P blocks W_p (+)= Σ_k Q_k C_kp.
+/// Σ_p += Σ_k Q_k C_kp for rows `at..at + R`.
 #[inline(always)]
-fn tile<A: Arithmetic, const R: usize, const P: usize>(
+fn add_products<A: Arithmetic, const R: usize, const P: usize>(
     blocks: &[&[Row]],
     c: [&[Small]; P],
-    w: &mut [&mut [Row]; P],
     at: usize,
-    add: bool,
+    sum: &mut [[A::Lanes; R]; P],
 ) {
-    let mut sum = [[A::splat(0.0); R]; P];
-    if add {
-        for p in 0..P {
-            for r in 0..R {
-                sum[p][r] = A::load(&w[p][at + r]);
-            }
-        }
-    }
     let mut of_row = [A::splat(0.0); P];
     for (k, block) in blocks.iter().enumerate() {
         for r in 0..R {
@@ -212,6 +204,26 @@ fn tile<A: Arithmetic, const R: usize, const P: usize>(
             }
         }
     }
+}
+
+/// Rows `at..at + R` of P blocks W_p (+)= Σ_k Q_k C_kp.
+#[inline(always)]
+fn tile<A: Arithmetic, const R: usize, const P: usize>(
+    blocks: &[&[Row]],
+    c: [&[Small]; P],
+    w: &mut [&mut [Row]; P],
+    at: usize,
+    add: bool,
+) {
+    let mut sum = [[A::splat(0.0); R]; P];
+    if add {
+        for p in 0..P {
+            for r in 0..R {
+                sum[p][r] = A::load(&w[p][at + r]);
+            }
+        }
+    }
+    add_products::<A, R, P>(blocks, c, at, &mut sum);
     for p in 0..P {
         for r in 0..R {
             A::store(sum[p][r], &mut w[p][at + r]);
@@ -299,6 +311,38 @@ fn recur_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>(
     out.iter_mut().for_each(|out| *out = transpose(out));
 }
 
+/// Rows `at..at + R` of W = (W + Σ_k Q_k C_k) S, and of a copy of it unless that is empty.
+#[inline(always)]
+fn scale_tile<A: Arithmetic, const R: usize>(
+    q: &[&[Row]],
+    c: &[Small],
+    s: &Small,
+    w: &mut [Row],
+    copy: &mut [Row],
+    at: usize,
+) {
+    let mut rest = [ZERO; R];
+    rest.copy_from_slice(&w[at..at + R]);
+    if !q.is_empty() {
+        let mut sum = [A::splat(0.0); R];
+        for r in 0..R {
+            sum[r] = A::load(&rest[r]);
+        }
+        add_products::<A, R, 1>(q, [c], at, std::array::from_mut(&mut sum));
+        for r in 0..R {
+            A::store(sum[r], &mut rest[r]);
+        }
+    }
+    let mut scaled = [[A::splat(0.0); R]; 1];
+    add_products::<A, R, 1>(&[&rest], [std::slice::from_ref(s)], 0, &mut scaled);
+    for r in 0..R {
+        A::store(scaled[0][r], &mut w[at + r]);
+        if let Some(copy) = copy.get_mut(at + r) {
+            A::store(scaled[0][r], copy);
+        }
+    }
+}
+
 /// W = (W + Σ_k Q_k C_k) S, a copy of it unless that is empty, and its Wᵀ W, in one pass.
 #[inline(always)]
 fn scale_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>(
@@ -310,22 +354,18 @@ fn scale_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>(
     square: &mut Small,
 ) {
     *square = SMALL_ZERO;
-    let mut before = [ZERO; PANEL];
-    let mut q_panels = Vec::with_capacity(q.len());
-    for (number, w) in w.chunks_mut(PANEL).enumerate() {
-        let panel = PANEL * number..PANEL * number + w.len();
-        let before = &mut before[..w.len()];
-        before.copy_from_slice(w);
-        if !q.is_empty() {
-            q_panels.clear();
-            q_panels.extend(q.iter().map(|q| &q[panel.clone()]));
-            update_with::<A, R, HIGH, P>(&q_panels, c, &mut [before], true);
+    let rows = w.len();
+    for first in (0..rows).step_by(TALL) {
+        let end = (first + TALL).min(rows);
+        let whole = end - (end - first) % R;
+        for at in (first..whole).step_by(R) {
+            scale_tile::<A, R>(q, c, s, w, copy, at);
         }
-        update_with::<A, R, HIGH, 1>(&[before], std::slice::from_ref(s), &mut [w], false);
+        for at in whole..end {
+            scale_tile::<A, 1>(q, c, s, w, copy, at);
+        }
+        let w = &w[first..end];
         outer::<A, HIGH, 1>(w, [w], std::array::from_mut(square));
-        if let Some(copy) = copy.get_mut(panel) {
-            copy.copy_from_slice(w);
-        }
     }
 }
 
@@ -437,6 +477,10 @@ dispatched! {
     factor = factor_with(
         tree: &Tree, matrix: &Csr, shift: f64, workspace: &mut Workspace, packed: &mut Packed, pivots: &mut Pivots
     );
+    /// Reduces a symmetric matrix to tridiagonal form.
+    reflect = reflect_with(of: &mut Reflected);
+    /// Panels of eight rows of the identity become rows of eigenvectors.
+    turn = turn_with(reflected: &Reflected, rotations: &Rotations, panels: &mut [Row]);
     /// X = (L D Lᵀ)⁻¹ X; `x` has one row more than the matrix.
     solve = solve_with(factor: &Packed, x: &mut [Row]);
 }

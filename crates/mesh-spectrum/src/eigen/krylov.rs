@@ -359,7 +359,7 @@ impl<'a> Krylov<'a> {
         let clock = &self.tools.progress.clock;
         let combined = clock.time(Step::Vectors, || self.combine(&ritz, chosen, 0, false, &mut into));
         self.nearest = nearest;
-        let column = |&k: &usize| (0..ritz.values.len()).map(|i| ritz.vectors[(i, k)]).collect();
+        let column = |&k: &usize| ritz.vector(k).collect();
         self.loss.deflate(chosen.iter().map(column).collect());
         combined
     }
@@ -381,7 +381,7 @@ impl<'a> Krylov<'a> {
 
     /// Eigenpairs of the projected operator; `None` if they cannot be computed (not finite).
     pub(crate) fn ritz(&self) -> Option<Ritz> {
-        self.tools.progress.clock.time(Step::Project, || self.projected.ritz(self.dimension()))
+        self.tools.progress.clock.time(Step::Project, || self.projected.ritz(self.tools.kind, self.dimension()))
     }
 
     /// Ritz vectors of the chosen columns into blocks of eight, from column `skip` of the first one on (the others are
@@ -474,8 +474,8 @@ fn coefficients(ritz: &Ritz, chosen: &[usize], skip: usize, blocks: usize) -> Ve
     let mut c = vec![SMALL_ZERO; blocks * (skip + chosen.len()).div_ceil(WIDTH)];
     for (place, &column) in (skip..).zip(chosen) {
         let (c, to) = (&mut c[place / WIDTH * blocks..][..blocks], place % WIDTH);
-        for (from, value) in ritz.vectors.col(column).iter().enumerate() {
-            c[from / WIDTH][from % WIDTH][to] = *value;
+        for (from, value) in ritz.vector(column).enumerate() {
+            c[from / WIDTH][from % WIDTH][to] = value;
         }
     }
     c

@@ -35,6 +35,7 @@ mod single;
 mod slice;
 mod solve;
 mod spectrum;
+mod tridiagonal;
 mod weyl;
 
 use std::sync::atomic::{AtomicUsize, Ordering};

@@ -2,11 +2,11 @@
 //! starts with, and its eigenpairs.
 
 use std::ops::Range;
-
-use faer::Mat;
+use std::sync::OnceLock;
 
 use crate::eigen::block::WIDTH;
-use crate::eigen::dense;
+use crate::eigen::kernel::Kind;
+use crate::eigen::tridiagonal::{Components, Decomposed};
 
 /// H, growing by a block at a time.
 #[derive(Debug, Default)]
@@ -22,7 +22,9 @@ pub(crate) struct Ritz {
     pub(crate) values: Vec<f64>,
     /// What couples each vector to the block that is not yet in H: the residual is its norm.
     pub(crate) couplings: Vec<[f64; WIDTH]>,
-    pub(crate) vectors: Mat<f64>,
+    decomposed: Decomposed,
+    /// Made when they are wanted.
+    vectors: OnceLock<Components>,
 }
 
 impl Projected {
@@ -62,17 +64,24 @@ impl Projected {
 
     /// Eigenpairs of the leading m × m part, the next eight rows being what it is coupled to; `None` if they cannot be
     /// computed (not finite).
-    pub(crate) fn ritz(&self, m: usize) -> Option<Ritz> {
-        let h = Mat::from_fn(m, m, |i, j| self.rows[i][j]);
-        let (values, vectors) = dense::symmetric(&h)?;
-        let first = self.coupled_to(m).start;
-        let coupling = |k: usize, a: usize| (first..m).map(|i| self.rows[m + a][i] * vectors[(i, k)]).sum();
+    pub(crate) fn ritz(&self, kind: Kind, m: usize) -> Option<Ritz> {
+        let decomposed = Decomposed::new(kind, m, |i, j| self.rows[i][j])?;
+        let coupled = self.coupled_to(m).start..m;
+        let last = decomposed.components(coupled.clone());
+        let coupling = |k: usize, a: usize| coupled.clone().map(|i| self.rows[m + a][i] * last.entry(i, k)).sum();
         let couplings = (0..m).map(|k| std::array::from_fn(|a| coupling(k, a))).collect();
-        Some(Ritz { values, couplings, vectors })
+        Some(Ritz { values: decomposed.values.clone(), couplings, decomposed, vectors: OnceLock::new() })
     }
 }
 
 impl Ritz {
+    /// The coordinates of Ritz vector k.
+    pub(crate) fn vector(&self, k: usize) -> impl Iterator<Item = f64> {
+        let m = self.values.len();
+        let vectors = self.vectors.get_or_init(|| self.decomposed.components(0..m));
+        (0..m).map(move |i| vectors.entry(i, k))
+    }
+
     /// ‖Op x − θ x‖.
     pub(crate) fn residual(&self, k: usize) -> f64 {
         self.couplings[k].iter().map(|x| x * x).sum::<f64>().sqrt()
