@@ -11,7 +11,7 @@
 use crate::eigen::arithmetic::Arithmetic;
 use crate::eigen::block::{Row, SMALL_ZERO, WIDTH, ZERO};
 use crate::eigen::factor::Pivots;
-use crate::eigen::kernel::{at_once, in_groups, outer};
+use crate::eigen::products::{at_once, in_groups, outer};
 use crate::eigen::solve::{Layout, Packed, Supernode};
 use crate::operator::Csr;
 
@@ -299,7 +299,7 @@ fn update<A: Arithmetic, const HIGH: usize, const P: usize>(
         let right = &scaled[h * columns..][..columns];
         in_groups!(P, groups - h, g, N => {
             let mut tiles = [SMALL_ZERO; N];
-            outer::<A, HIGH, N>(right, std::array::from_fn(|p| of_panel(h + g + p)), &mut tiles);
+            outer::<A, HIGH, N>(right, std::array::from_fn(|p| of_panel(h + g + p)), 0, &mut tiles);
             for (p, tile) in tiles.iter().enumerate() {
                 subtract(front, side, rest + WIDTH * (h + g + p), rest + WIDTH * h, tile);
             }

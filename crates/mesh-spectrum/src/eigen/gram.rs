@@ -5,8 +5,9 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use crate::eigen::block::{Row, SMALL_ZERO, Small, WIDTH, add, transpose};
-use crate::eigen::kernel::{self, Kind, PANEL};
+use crate::eigen::kernel::{self, Kind};
 use crate::eigen::parts::parts;
+use crate::eigen::products::PANEL;
 use crate::eigen::single::{SingleRow, SingleSmall};
 use crate::eigen::{EigenError, Progress};
 

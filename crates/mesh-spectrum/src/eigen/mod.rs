@@ -29,6 +29,7 @@ mod output;
 mod pages;
 mod parts;
 mod polish;
+mod products;
 mod projected;
 mod seconds;
 mod single;

@@ -9,7 +9,8 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use crate::eigen::block::{Row, SMALL_ZERO, Small, ZERO, add, negative};
-use crate::eigen::kernel::{self, Kind, PANEL};
+use crate::eigen::kernel::{self, Kind};
+use crate::eigen::products::PANEL;
 use crate::eigen::{EigenError, Progress};
 
 /// The most parts, and the fewest rows of one: the work on them takes longer than to wake a thread.

@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 
 use crate::eigen::block::WIDTH;
 use crate::eigen::kernel::Kind;
-use crate::eigen::tridiagonal::{Components, Decomposed};
+use crate::eigen::tridiagonal::{Decomposed, VectorRows};
 
 /// H, growing by a block at a time.
 #[derive(Debug, Default)]
@@ -24,7 +24,7 @@ pub(crate) struct Ritz {
     pub(crate) couplings: Vec<[f64; WIDTH]>,
     decomposed: Decomposed,
     /// Made when they are wanted.
-    vectors: OnceLock<Components>,
+    vectors: OnceLock<VectorRows>,
 }
 
 impl Projected {
@@ -67,7 +67,7 @@ impl Projected {
     pub(crate) fn ritz(&self, kind: Kind, m: usize) -> Option<Ritz> {
         let decomposed = Decomposed::new(kind, m, |i, j| self.rows[i][j])?;
         let coupled = self.coupled_to(m).start..m;
-        let last = decomposed.components(coupled.clone());
+        let last = decomposed.vector_rows(coupled.clone());
         let coupling = |k: usize, a: usize| coupled.clone().map(|i| self.rows[m + a][i] * last.entry(i, k)).sum();
         let couplings = (0..m).map(|k| std::array::from_fn(|a| coupling(k, a))).collect();
         Some(Ritz { values: decomposed.values.clone(), couplings, decomposed, vectors: OnceLock::new() })
@@ -78,7 +78,7 @@ impl Ritz {
     /// The coordinates of Ritz vector k.
     pub(crate) fn vector(&self, k: usize) -> impl Iterator<Item = f64> {
         let m = self.values.len();
-        let vectors = self.vectors.get_or_init(|| self.decomposed.components(0..m));
+        let vectors = self.vectors.get_or_init(|| self.decomposed.vector_rows(0..m));
         (0..m).map(move |i| vectors.entry(i, k))
     }
 

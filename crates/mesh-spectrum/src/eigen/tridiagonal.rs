@@ -25,7 +25,7 @@ pub(crate) struct Decomposed {
 }
 
 /// Some rows of all eigenvectors.
-pub(crate) struct Components {
+pub(crate) struct VectorRows {
     first: usize,
     side: usize,
     order: Vec<usize>,
@@ -33,7 +33,7 @@ pub(crate) struct Components {
     panels: Block,
 }
 
-impl Components {
+impl VectorRows {
     /// Entry i of eigenvector k.
     pub(crate) fn entry(&self, i: usize, k: usize) -> f64 {
         self.panels[self.side * (i / WIDTH - self.first) + self.order[k]][i % WIDTH]
@@ -54,7 +54,7 @@ impl Decomposed {
     }
 
     /// Those rows of the eigenvectors, a few more perhaps.
-    pub(crate) fn components(&self, rows: Range<usize>) -> Components {
+    pub(crate) fn vector_rows(&self, rows: Range<usize>) -> VectorRows {
         let side = self.values.len();
         let first = rows.start / WIDTH;
         let mut panels = Block::zeros(side * (rows.end.div_ceil(WIDTH) - first));
@@ -62,7 +62,7 @@ impl Decomposed {
             panels[side * (i / WIDTH - first) + i][i % WIDTH] = 1.0;
         }
         kernel::turn(self.kind, &self.reflected, &self.rotations, &mut panels);
-        Components { first, side, order: self.order.clone(), panels }
+        VectorRows { first, side, order: self.order.clone(), panels }
     }
 }
 
@@ -326,7 +326,7 @@ mod tests {
             let mut found = Vec::new();
             for kind in [Kind::Portable, Kind::Avx2, Kind::Avx512].into_iter().filter(|kind| kind.is_available()) {
                 let decomposed = Decomposed::new(kind, side, entry).unwrap();
-                let (values, all) = (&decomposed.values, decomposed.components(0..side));
+                let (values, all) = (&decomposed.values, decomposed.vector_rows(0..side));
                 assert!(values.is_sorted());
                 for (k, value) in values.iter().enumerate() {
                     for i in 0..side {
@@ -337,7 +337,7 @@ mod tests {
                         assert!((along - f64::from(i == k)).abs() < 1e-13);
                     }
                 }
-                let last = decomposed.components(side.saturating_sub(8)..side);
+                let last = decomposed.vector_rows(side.saturating_sub(8)..side);
                 for i in side.saturating_sub(8)..side {
                     assert!((0..side).all(|k| (last.entry(i, k) - all.entry(i, k)).abs() < 1e-13));
                 }
@@ -362,7 +362,7 @@ mod tests {
         ];
         for entry in matrices {
             let decomposed = Decomposed::new(Kind::best(), 20, entry).unwrap();
-            let all = decomposed.components(0..20);
+            let all = decomposed.vector_rows(0..20);
             for k in 0..20 {
                 for i in 0..20 {
                     let product: f64 = (0..20).map(|j| entry(i, j) * all.entry(j, k)).sum();
