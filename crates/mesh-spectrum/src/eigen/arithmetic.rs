@@ -5,14 +5,20 @@
 
 use crate::eigen::block::{Row, WIDTH};
 
-/// How a product and a sum are rounded, and the registers that hold a row.
+/// How a product and a sum are rounded, once unless it is said otherwise, and the registers that hold a row.
 pub(crate) trait Arithmetic {
     /// Eight numbers.
     type Lanes: Copy;
     /// a·b + c.
-    fn fma(a: f64, b: f64, c: f64) -> f64;
+    #[inline(always)]
+    fn fma(a: f64, b: f64, c: f64) -> f64 {
+        a.mul_add(b, c)
+    }
     /// The same in single precision.
-    fn fma_single(a: f32, b: f32, c: f32) -> f32;
+    #[inline(always)]
+    fn fma_single(a: f32, b: f32, c: f32) -> f32 {
+        a.mul_add(b, c)
+    }
     fn load(row: &Row) -> Self::Lanes;
     fn store(lanes: Self::Lanes, row: &mut Row);
     /// One number eight times.
@@ -21,11 +27,36 @@ pub(crate) trait Arithmetic {
     fn multiply_add(a: Self::Lanes, b: Self::Lanes, c: Self::Lanes) -> Self::Lanes;
 }
 
+/// Lanes that are arrays, which the compiler puts into whatever registers there are.
+macro_rules! on_arrays {
+    ($name:ident { $($fma:item)* }) => {
+        impl Arithmetic for $name {
+            type Lanes = Row;
+            $($fma)*
+            #[inline(always)]
+            fn load(row: &Row) -> Row {
+                *row
+            }
+            #[inline(always)]
+            fn store(lanes: Row, row: &mut Row) {
+                *row = lanes;
+            }
+            #[inline(always)]
+            fn splat(x: f64) -> Row {
+                [x; WIDTH]
+            }
+            #[inline(always)]
+            fn multiply_add(a: Row, b: Row, c: Row) -> Row {
+                std::array::from_fn(|k| Self::fma(a[k], b[k], c[k]))
+            }
+        }
+    };
+}
+
 /// Two roundings: any processor.
 pub(crate) struct Plain;
 
-impl Arithmetic for Plain {
-    type Lanes = Row;
+on_arrays!(Plain {
     #[inline(always)]
     fn fma(a: f64, b: f64, c: f64) -> f64 {
         a * b + c
@@ -34,61 +65,19 @@ impl Arithmetic for Plain {
     fn fma_single(a: f32, b: f32, c: f32) -> f32 {
         a * b + c
     }
-    #[inline(always)]
-    fn load(row: &Row) -> Row {
-        *row
-    }
-    #[inline(always)]
-    fn store(lanes: Row, row: &mut Row) {
-        *row = lanes;
-    }
-    #[inline(always)]
-    fn splat(x: f64) -> Row {
-        [x; WIDTH]
-    }
-    #[inline(always)]
-    fn multiply_add(a: Row, b: Row, c: Row) -> Row {
-        std::array::from_fn(|k| a[k] * b[k] + c[k])
-    }
-}
+});
 
-/// One rounding: processors with a fused instruction that every program may use.
+/// Processors with a fused instruction that every program may use.
 #[cfg(target_arch = "aarch64")]
 pub(crate) struct Fused;
 
 #[cfg(target_arch = "aarch64")]
-impl Arithmetic for Fused {
-    type Lanes = Row;
-    #[inline(always)]
-    fn fma(a: f64, b: f64, c: f64) -> f64 {
-        a.mul_add(b, c)
-    }
-    #[inline(always)]
-    fn fma_single(a: f32, b: f32, c: f32) -> f32 {
-        a.mul_add(b, c)
-    }
-    #[inline(always)]
-    fn load(row: &Row) -> Row {
-        *row
-    }
-    #[inline(always)]
-    fn store(lanes: Row, row: &mut Row) {
-        *row = lanes;
-    }
-    #[inline(always)]
-    fn splat(x: f64) -> Row {
-        [x; WIDTH]
-    }
-    #[inline(always)]
-    fn multiply_add(a: Row, b: Row, c: Row) -> Row {
-        std::array::from_fn(|k| a[k].mul_add(b[k], c[k]))
-    }
-}
+on_arrays!(Fused {});
 
 #[cfg(target_arch = "x86_64")]
 pub(crate) use x86::{Avx2, Avx512};
 
-/// One rounding: AVX2 and AVX-512. What is here may only be called from functions that are compiled for these, and that are
+/// AVX2 and AVX-512. What is here may only be called from functions that are compiled for these, and that are
 /// called where the processor has them.
 #[cfg(target_arch = "x86_64")]
 mod x86 {
@@ -105,14 +94,6 @@ mod x86 {
 
     impl Arithmetic for Avx2 {
         type Lanes = [__m256d; 2];
-        #[inline(always)]
-        fn fma(a: f64, b: f64, c: f64) -> f64 {
-            a.mul_add(b, c)
-        }
-        #[inline(always)]
-        fn fma_single(a: f32, b: f32, c: f32) -> f32 {
-            a.mul_add(b, c)
-        }
         #[inline(always)]
         fn load(row: &Row) -> [__m256d; 2] {
             let (halves, _) = row.as_chunks::<{ WIDTH / 2 }>();
@@ -144,14 +125,6 @@ mod x86 {
 
     impl Arithmetic for Avx512 {
         type Lanes = __m512d;
-        #[inline(always)]
-        fn fma(a: f64, b: f64, c: f64) -> f64 {
-            a.mul_add(b, c)
-        }
-        #[inline(always)]
-        fn fma_single(a: f32, b: f32, c: f32) -> f32 {
-            a.mul_add(b, c)
-        }
         #[inline(always)]
         fn load(row: &Row) -> __m512d {
             // SAFETY: eight numbers; and see the module.

@@ -1,8 +1,9 @@
 //! Eigenpairs of a small dense symmetric matrix, checked.
 //!
 //! The library's divide and conquer is right to rounding nearly always. But of the 25 matrices that the slices of a million
-//! vertices were projected on in one run, two came back with three or four pairs mixed by 1e-8 (faer 0.24.4), orthonormal
-//! and unannounced, and a slice with such vectors fails. So what comes back is tested, and mixed pairs are turned apart.
+//! vertices had been projected on in one run, two came back with three or four pairs mixed by 1e-8 (faer 0.24.4),
+//! orthonormal and unannounced. So what comes back is tested, and mixed pairs are turned apart. (Slices have a solver of
+//! their own, `tridiagonal`.)
 
 use faer::{Mat, Side};
 

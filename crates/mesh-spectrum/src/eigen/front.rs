@@ -11,7 +11,7 @@
 use crate::eigen::arithmetic::Arithmetic;
 use crate::eigen::block::{Row, SMALL_ZERO, WIDTH, ZERO};
 use crate::eigen::factor::Pivots;
-use crate::eigen::products::{at_once, in_groups, outer};
+use crate::eigen::products::{in_groups, outer};
 use crate::eigen::solve::{Layout, Packed, Supernode};
 use crate::operator::Csr;
 

@@ -16,7 +16,7 @@
 //! Orthogonality is lost along the eigenvectors next to the shift: there a solve loses most digits, and there Op
 //! multiplies most what has been lost. So every block is made orthogonal to the few Ritz vectors nearest to the shift,
 //! which are read anyway or cost little. What it has in common with the rest of the basis, K_j = Bᵀ Q_j, is measured in
-//! about two steps of three, in a pass that takes off at the same time what the block before is known to have left:
+//! about every second step, in a pass that takes off at the same time what the block before is known to have left:
 //!
 //! Bᵀ W = H K_j − K_{j−1} R_jᵀ − K_j α_j.
 //!

@@ -3,10 +3,11 @@
 //! In the order of the work: `component` (mass scaled out, one connected component at a time), `order` (elimination
 //! order), `spectrum` (how far each one's spectrum must go), `factor` with `front` (L D Lᵀ and inertia), `solve` (its
 //! solves), `chain` (shifts, one after another),
-//! `slice` (the pairs around a shift), `krylov` with `projected`, `dense` and `loss` (the space they are found in),
+//! `slice` (the pairs around a shift), `krylov` with `projected`, `tridiagonal` and `loss` (the space they are found in),
 //! `assemble` (chains to a spectrum), `finish` with `gram` and `single` (orthogonality, residuals), `output` (eigenvectors on
-//! vertices), `basis` (the result). `kernel`, `parts` (the same on several threads), `block` and `pages` hold what the
-//! time is spent in. `general` does all of it for a mass that is not diagonal.
+//! vertices), `basis` (the result). `kernel` with `arithmetic` (which instructions), `products`, `parts` (the same on several
+//! threads), `block` and `pages` hold what the time is spent in. `dense` solves small components; `general` does all of it
+//! for a mass that is not diagonal.
 
 mod arithmetic;
 mod assemble;

@@ -2,6 +2,9 @@
 //!
 //! Tall blocks do not fit in any cache, so every product reads each of them once, panel by panel, for as many columns
 //! as the registers hold; the lines that come next are asked for ahead of time.
+//!
+//! Lanes are only touched in plain loops: a closure that is not inlined is not compiled for the instructions of the
+//! function that it is written in, and every operation becomes a call.
 
 use std::ops::Range;
 
@@ -31,7 +34,7 @@ macro_rules! in_groups {
     ($p:ident, $count:expr, $first:ident, $n:ident => $body:block) => {
         let mut $first = 0;
         while $first < $count {
-            let taken = at_once::<$p>($count - $first);
+            let taken = $crate::eigen::products::at_once::<$p>($count - $first);
             match taken {
                 3 => {
                     const $n: usize = 3;
@@ -52,7 +55,8 @@ macro_rules! in_groups {
 }
 pub(crate) use in_groups;
 
-/// out_p += Qᵀ W_p for P blocks, HIGH columns of Q at once: an entry of Q, once read, serves all blocks.
+/// out_p += Qᵀ W_p for P blocks, HIGH columns of Q at once: an entry of Q, once read, serves all blocks. Rows of Q are asked
+/// for so many `ahead`, or not if that is 0.
 #[inline(always)]
 pub(crate) fn outer<A: Arithmetic, const HIGH: usize, const P: usize>(
     q: &[Row],
@@ -205,7 +209,7 @@ pub(crate) fn update_with<A: Arithmetic, const R: usize, const HIGH: usize, cons
     }
 }
 
-/// Rows that `recur` walks together: of all blocks they stay in a core's first cache, nearly.
+/// Rows that `recur` and `scale` go through together: of all blocks they stay in a core's cache.
 const TALL: usize = 64;
 
 /// W += Σ_k Q_k C_k, then out_i = P_iᵀ W and, after them, Wᵀ W and, unless V is empty, P_iᵀ V, in one pass.
@@ -257,18 +261,14 @@ fn scale_tile<A: Arithmetic, const R: usize>(
     at: usize,
 ) {
     let mut rest = [ZERO; R];
-    rest.copy_from_slice(&w[at..at + R]);
-    if !q.is_empty() {
-        let mut sum = [A::splat(0.0); R];
-        for r in 0..R {
-            sum[r] = A::load(&rest[r]);
-        }
-        add_products::<A, R, 1>(q, [c], at, std::array::from_mut(&mut sum));
-        for r in 0..R {
-            A::store(sum[r], &mut rest[r]);
-        }
+    let [mut sum, mut scaled] = [[[A::splat(0.0); R]]; 2];
+    for r in 0..R {
+        sum[0][r] = A::load(&w[at + r]);
     }
-    let mut scaled = [[A::splat(0.0); R]; 1];
+    add_products::<A, R, 1>(q, [c], at, &mut sum);
+    for r in 0..R {
+        A::store(sum[0][r], &mut rest[r]);
+    }
     add_products::<A, R, 1>(&[&rest], [std::slice::from_ref(s)], 0, &mut scaled);
     for r in 0..R {
         A::store(scaled[0][r], &mut w[at + r]);

@@ -70,7 +70,15 @@ pub(crate) fn correct_with<A: Arithmetic, const R: usize, const HIGH: usize, con
     w: &mut [&mut [Row]],
 ) {
     let rows = w.first().map_or(0, |w| w.len());
-    let whole = rows - rows % (P * R);
-    (0..whole).step_by(P * R).for_each(|at| correct_tile::<A, R, P>(q, c, w, at));
+    // Two tiles at once, where there are registers for that many sums.
+    let tall = if P > 1 { 2 * R } else { R };
+    let whole = rows - rows % tall;
+    for at in (0..whole).step_by(tall) {
+        if P > 1 {
+            correct_tile::<A, R, 2>(q, c, w, at);
+        } else {
+            correct_tile::<A, R, 1>(q, c, w, at);
+        }
+    }
     (whole..rows).for_each(|at| correct_tile::<A, 1, 1>(q, c, w, at));
 }
