@@ -3,9 +3,11 @@
 //! Which kind runs is decided at run time ([`Kind::best`]): AVX-512, AVX2 (both with fused multiply-add), or portable
 //! code. The two fused kinds add in the same order and give the same bytes; the portable one rounds products too.
 
+use crate::eigen::arithmetic::Arithmetic;
 #[cfg(target_arch = "aarch64")]
 use crate::eigen::arithmetic::Fused;
-use crate::eigen::arithmetic::{Arithmetic, Plain};
+#[cfg(not(target_arch = "aarch64"))]
+use crate::eigen::arithmetic::Plain;
 #[cfg(target_arch = "x86_64")]
 use crate::eigen::arithmetic::{Avx2, Avx512};
 use crate::eigen::block::{Row, Small, WIDTH, ZERO};

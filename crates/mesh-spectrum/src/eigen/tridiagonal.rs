@@ -189,6 +189,9 @@ pub(crate) struct Rotations {
     turns: Vec<[f64; 2]>,
 }
 
+/// Numbers whose squares are nothing.
+const SMALLEST: f64 = 1e-150;
+
 /// Sweeps that a single eigenvalue may need.
 const SWEEPS_MAX: usize = 60;
 
@@ -198,7 +201,7 @@ impl Rotations {
         let mut all = Rotations::default();
         for l in 0..d.len() {
             for sweep in 0.. {
-                let small = |k: usize| e[k].abs() <= f64::EPSILON * (d[k].abs() + d[k + 1].abs());
+                let small = |k: usize| e[k].abs() <= (f64::EPSILON * (d[k].abs() + d[k + 1].abs())).max(SMALLEST);
                 let end = (l..d.len() - 1).find(|&k| small(k)).unwrap_or(d.len() - 1);
                 if end == l {
                     break;
@@ -353,10 +356,11 @@ mod tests {
 
     #[test]
     fn what_is_special_is_met() {
-        // Diagonal; a block of zeros; a cluster of one value; two equal parts.
-        let matrices: [fn(usize, usize) -> f64; 4] = [
+        // Diagonal; zeros, and next to nothing beside them; a cluster of one value; two equal parts.
+        let matrices: [fn(usize, usize) -> f64; 5] = [
             |i, j| if i == j { i as f64 } else { 0.0 },
             |_, _| 0.0,
+            |i, j| if i.abs_diff(j) == 1 { 1e-170 } else { 0.0 },
             |i, j| f64::from(i == j),
             |i, j| if i % 10 == j % 10 && i != j { 0.0 } else { 1.0 / (1.0 + (i % 10 + j % 10) as f64) },
         ];
