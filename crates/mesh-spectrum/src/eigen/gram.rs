@@ -7,15 +7,12 @@ use rayon::prelude::*;
 use crate::eigen::block::{Row, SMALL_ZERO, Small, WIDTH, add, transpose};
 use crate::eigen::kernel::{self, Kind};
 use crate::eigen::parts::parts;
-use crate::eigen::products::PANEL;
+use crate::eigen::products::{AT_ONCE, PANEL};
 use crate::eigen::single::{SingleRow, SingleSmall};
 use crate::eigen::{EigenError, Progress};
 
 /// Rows of all blocks that are multiplied with one another at once: with a thousand pairs they fill half of a core's cache.
 const TOGETHER: usize = PANEL / 2;
-
-/// Columns of blocks that are multiplied with all others at once: as many as the kernel takes.
-const COLUMNS: usize = 3;
 
 /// The larger of two numbers; not a number, if one is not.
 pub(crate) fn larger(a: f64, b: f64) -> f64 {
@@ -69,10 +66,10 @@ pub(crate) struct Gram {
 impl Gram {
     pub(crate) fn of(blocks: &[&mut [Row]], kind: Kind, progress: &Progress) -> Result<Gram, EigenError> {
         let count = blocks.len();
-        let starts: Vec<usize> = (0..count).step_by(COLUMNS).collect();
+        let starts: Vec<usize> = (0..count).step_by(AT_ONCE).collect();
         let mut parts = vec![SMALL_ZERO; count * (count + 1) / 2];
         // Some columns of blocks at a time, down to the diagonal.
-        let group = |i: usize| (i..(i + COLUMNS).min(count), (i + COLUMNS).min(count));
+        let group = |i: usize| (i..(i + AT_ONCE).min(count), (i + AT_ONCE).min(count));
         for (i, of_group) in starts.iter().zip(products(blocks, &starts, group, kind, progress)?) {
             let (columns, end) = group(*i);
             for (i, out) in columns.zip(of_group.chunks_exact(end)) {
@@ -99,7 +96,7 @@ impl Gram {
         let mut runs: Vec<Range<usize>> = Vec::new();
         for &i in changed {
             match runs.last_mut() {
-                Some(run) if run.end == i && run.len() < COLUMNS => run.end += 1,
+                Some(run) if run.end == i && run.len() < AT_ONCE => run.end += 1,
                 _ => runs.push(i..i + 1),
             }
         }
@@ -118,9 +115,13 @@ impl Gram {
 
     /// The entry of two columns.
     pub(crate) fn entry(&self, a: usize, b: usize) -> f64 {
-        let (a, b) = (a.min(b), a.max(b));
-        let (k, i) = (a / WIDTH, b / WIDTH);
-        self.parts[i * (i + 1) / 2 + k][a % WIDTH][b % WIDTH]
+        let (part, row, column) = place(a, b);
+        self.parts[part][row][column]
+    }
+
+    fn entry_mut(&mut self, a: usize, b: usize) -> &mut f64 {
+        let (part, row, column) = place(a, b);
+        &mut self.parts[part][row][column]
     }
 
     /// The largest inner product of two of the columns, each scaled to length 1.
@@ -186,12 +187,13 @@ impl Gram {
             change.iter().enumerate().for_each(|(row, change)| *self.entry_mut(row, to) += change);
         }
     }
+}
 
-    fn entry_mut(&mut self, a: usize, b: usize) -> &mut f64 {
-        let (a, b) = (a.min(b), a.max(b));
-        let (k, i) = (a / WIDTH, b / WIDTH);
-        &mut self.parts[i * (i + 1) / 2 + k][a % WIDTH][b % WIDTH]
-    }
+/// Where the entry of two columns is: part, row and column.
+fn place(a: usize, b: usize) -> (usize, usize, usize) {
+    let (a, b) = (a.min(b), a.max(b));
+    let (k, i) = (a / WIDTH, b / WIDTH);
+    (i * (i + 1) / 2 + k, a % WIDTH, b % WIDTH)
 }
 
 /// What two neighbouring blocks are to get of others: the columns of a matrix C that V is to be multiplied with.

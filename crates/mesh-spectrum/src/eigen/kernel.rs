@@ -139,7 +139,7 @@ macro_rules! dispatched {
             {
                 #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx2,fma")]
                 fn avx512($($arg: $type),*) {
-                    $generic::<Avx512, 8, 8, 3>($($arg),*);
+                    $generic::<Avx512, 8, 8, { crate::eigen::products::AT_ONCE }>($($arg),*);
                 }
                 #[target_feature(enable = "avx2,fma")]
                 fn avx2($($arg: $type),*) {

@@ -18,14 +18,17 @@ pub(crate) const PANEL: usize = 256;
 /// How far ahead of its use a block's row is asked for.
 const AHEAD: usize = 64;
 
-/// How many of so many blocks to take at once: P at most, and none alone that need not be. P is 1 or 3.
+/// Blocks that a product takes at once, where there are registers for that many sums.
+pub(crate) const AT_ONCE: usize = 3;
+
+/// How many of so many blocks to take at once: P at most, and none alone that need not be. P is 1 or `AT_ONCE`.
 #[inline(always)]
 pub(crate) const fn at_once<const P: usize>(left: usize) -> usize {
     match left {
         _ if P == 1 => 1,
         1 => 1,
         2 | 4 => 2,
-        _ => 3,
+        _ => AT_ONCE,
     }
 }
 
@@ -36,8 +39,8 @@ macro_rules! in_groups {
         while $first < $count {
             let taken = $crate::eigen::products::at_once::<$p>($count - $first);
             match taken {
-                3 => {
-                    const $n: usize = 3;
+                $crate::eigen::products::AT_ONCE => {
+                    const $n: usize = $crate::eigen::products::AT_ONCE;
                     $body
                 }
                 2 => {
