@@ -2,50 +2,74 @@
 //!
 //! Each supernode has a front, a dense symmetric matrix over its columns and the rows below them. It starts with the
 //! entries of A − σI in the columns and with what the supernode's children left (their *updates*, added where their
-//! rows are in this front); then its columns are eliminated, and what that leaves of the rest is its own update. As
-//! children come before parents, updates live on a stack.
+//! rows are in this front); then its columns are eliminated, and what that leaves of the rest is its own update.
 //!
-//! A front is column-major, only its lower triangle is used. Its columns take the first places, filled up to a multiple
-//! of eight, so that the rows below start at a cache line and products run over whole tiles of 8 × 8.
+//! Only the columns of a front are put together before they are eliminated, in a *panel*. The rest of it is what the
+//! columns take off, which is written where the update belongs, and the children's updates are added to that: so nothing
+//! is filled with zeros or copied but the panel. As children come before parents, updates live on a stack, or rather on
+//! two, one for every other level of the tree, so that an update can be written while the children's are still there.
+//!
+//! Panels and updates are column-major, of updates only the lower triangle is used. The columns take the first places of
+//! a panel, filled up to a multiple of eight, so that the rows below start at a cache line and products run over whole
+//! tiles of 8 × 8. Eliminated columns go straight to where the solve wants them, eight rows of a column together, which
+//! is also what products want.
+
+use std::ops::Range;
 
 use crate::eigen::arithmetic::Arithmetic;
-use crate::eigen::block::{Row, SMALL_ZERO, WIDTH, ZERO};
+use crate::eigen::block::{Row, WIDTH, ZERO};
 use crate::eigen::factor::Pivots;
-use crate::eigen::products::{in_groups, outer};
-use crate::eigen::solve::{Layout, Packed, Supernode};
+use crate::eigen::products::{add_outer, in_groups};
+use crate::eigen::solve::{Layout, Packed, Supernode, for_length};
 use crate::operator::Csr;
 
-/// Columns that are eliminated before the rest of the front is updated: as much of them as stays in a core's cache.
-const TOGETHER: usize = 32;
+/// Blocks of eight columns that what was eliminated before them is taken off together, and blocks of an update that are
+/// made together: the rows that all of them take stay in a core's cache meanwhile.
+const TOGETHER: usize = 4;
 
 /// Fronts of more rows than this are refused: places in them are 32-bit numbers, and they take 30 GB.
 const ROWS_MAX: usize = 65_000;
 
+/// The place in its parent's front of what fills up a group of rows.
+const NOWHERE: u32 = u32::MAX;
+
 /// Which supernode leaves its update to which, and where everything goes.
 pub(crate) struct Tree {
-    /// The front's place of every stored entry of A in the lower triangle, as the entries come; and its diagonal
+    /// The place in the panel of every stored entry of A in the lower triangle, as the entries come; and its diagonal
     /// entries among all.
     places: Vec<u32>,
     diagonal: Vec<usize>,
     /// Where each row below a supernode is in the front of its parent; numbered as `Layout::rows`.
     in_parent: Vec<u32>,
-    /// Children of each supernode, which are the latest on the stack when its turn comes.
+    /// Where groups of eight rows whose neighbours are neighbours there, too, start there; or `NOWHERE`.
+    groups_in_parent: Vec<u32>,
+    fronts: Vec<Front>,
+    /// Children of all supernodes, one's after another's.
     children: Vec<u32>,
-    front_max: usize,
-    stack_max: usize,
+    panel_max: usize,
+    stack_max: [usize; 2],
+}
+
+/// What there is to know of a supernode's front beside its size.
+#[derive(Debug, Clone, Copy, Default)]
+struct Front {
+    /// Where its children start in the list of all.
+    children: usize,
+    /// Which stack its update is on, and where.
+    stack: usize,
+    at: usize,
+    /// How many of its rows below are columns of its parent, and how many there are.
+    shared: usize,
+    below: usize,
 }
 
 /// What a factorisation needs beside its result.
 #[derive(Default)]
 pub(crate) struct Workspace {
-    front: Vec<f64>,
-    stack: Vec<f64>,
-    /// Supernodes whose updates are on the stack.
-    waiting: Vec<u32>,
-    /// Columns in groups of eight rows, as they are and times D.
-    panel: Vec<Row>,
-    scaled: Vec<Row>,
-    pivots: Vec<f64>,
+    panel: Vec<f64>,
+    stacks: [Vec<f64>; 2],
+    /// −D times the columns of a supernode, as they are stored there.
+    minus: Vec<Row>,
 }
 
 impl Supernode {
@@ -63,6 +87,11 @@ impl Supernode {
     fn update_side(&self) -> usize {
         WIDTH * self.groups
     }
+
+    /// Rows of 64 bytes that its columns are stored in.
+    fn len(&self) -> usize {
+        self.below - self.diagonal + self.stride * self.groups
+    }
 }
 
 impl Tree {
@@ -76,34 +105,38 @@ impl Tree {
         }
         // Children of each, by the supernode that holds their first row below.
         let first_below = |s: &Supernode| layout.rows[s.rows..].first().copied().filter(|_| s.groups > 0);
+        let parent = |s: &Supernode| first_below(s).map(|row| supernode_of[row as usize] as usize);
         let mut of_parent: Vec<Vec<u32>> = vec![Vec::new(); supernodes.len()];
         for (number, s) in supernodes.iter().enumerate() {
-            if let Some(row) = first_below(s) {
-                of_parent[supernode_of[row as usize] as usize].push(number as u32);
-            }
+            parent(s).into_iter().for_each(|parent| of_parent[parent].push(number as u32));
+        }
+        let mut fronts = vec![Front::default(); supernodes.len()];
+        for (number, s) in supernodes.iter().enumerate().rev() {
+            fronts[number].stack = parent(s).map_or(0, |parent| 1 - fronts[parent].stack);
         }
         let mut tree = Tree {
             places: vec![0; matrix.columns.len()],
             diagonal: Vec::with_capacity(n),
-            in_parent: vec![0; layout.rows.len()],
-            children: of_parent.iter().map(|children| children.len() as u32).collect(),
-            front_max: 0,
-            stack_max: 0,
+            in_parent: vec![NOWHERE; layout.rows.len()],
+            groups_in_parent: vec![NOWHERE; layout.rows.len() / WIDTH],
+            fronts,
+            children: of_parent.concat(),
+            panel_max: 0,
+            stack_max: [0; 2],
         };
-        let mut place = vec![0u32; n + 1];
-        let (mut stack, mut waiting) = (0, Vec::new());
-        for (s, children) in supernodes.iter().zip(&of_parent) {
-            let side = s.side();
+        let mut place = vec![0u32; n];
+        let (mut taken, mut children_before) = ([0; 2], 0);
+        for (number, (s, children)) in supernodes.iter().zip(&of_parent).enumerate() {
+            let (side, below) = (s.side(), s.update_side());
             if side > ROWS_MAX {
                 return None;
             }
             for j in 0..s.width {
                 place[s.begin + j] = j as u32;
             }
-            for (i, &row) in layout.rows[s.rows..][..s.update_side()].iter().enumerate() {
+            for (i, &row) in layout.rows[s.rows..][..below].iter().enumerate().filter(|(_, row)| (**row as usize) < n) {
                 place[row as usize] = (s.head() + i) as u32;
             }
-            place[n] = 0; // what fills up groups: zeros, to be added anywhere
             for row in s.begin..s.begin + s.width {
                 let entries = matrix.start[row]..matrix.start[row + 1];
                 let diagonal = entries.start + matrix.columns[entries.clone()].partition_point(|&c| (c as usize) < row);
@@ -113,17 +146,34 @@ impl Tree {
                 }
             }
             for &child in children {
+                let front = &mut tree.fronts[child as usize];
                 let child = &supernodes[child as usize];
-                for i in child.rows..child.rows + child.update_side() {
-                    tree.in_parent[i] = place[layout.rows[i] as usize];
+                let rows = &layout.rows[child.rows..][..child.update_side()];
+                front.shared = rows.partition_point(|&row| (row as usize) < s.begin + s.width);
+                front.below = rows.partition_point(|&row| (row as usize) < n);
+                for group in (child.rows..child.rows + child.update_side()).step_by(WIDTH) {
+                    let places = &mut tree.in_parent[group..group + WIDTH];
+                    for (to, &row) in places.iter_mut().zip(&layout.rows[group..]) {
+                        *to = place.get(row as usize).copied().unwrap_or(NOWHERE);
+                    }
+                    // What fills up a group is zero, and may be added to whatever comes next in a column.
+                    let start = places[0];
+                    let neighbours = places.iter().zip(start..).all(|(&at, next)| at == next || at == NOWHERE);
+                    if neighbours && start as usize + WIDTH <= side {
+                        tree.groups_in_parent[group / WIDTH] = start;
+                    }
                 }
             }
-            let taken = waiting.split_off(waiting.len().checked_sub(children.len())?);
-            stack -= taken.iter().sum::<usize>();
-            waiting.push(s.update_side() * s.update_side());
-            stack += s.update_side() * s.update_side();
-            tree.front_max = tree.front_max.max(side * side);
-            tree.stack_max = tree.stack_max.max(stack);
+            // The children's updates are the last ones on the other stack.
+            let Front { stack, .. } = tree.fronts[number];
+            if let Some(&first) = children.first() {
+                taken[1 - stack] = tree.fronts[first as usize].at;
+            }
+            tree.fronts[number] = Front { children: children_before, at: taken[stack], ..tree.fronts[number] };
+            children_before += children.len();
+            taken[stack] += below * below;
+            tree.stack_max[stack] = tree.stack_max[stack].max(taken[stack]);
+            tree.panel_max = tree.panel_max.max(side * s.width);
         }
         Some(tree)
     }
@@ -135,16 +185,23 @@ impl Tree {
 
     /// Bytes of the tree.
     pub(crate) fn bytes(&self) -> usize {
-        4 * self.places.len() + 8 * self.diagonal.len() + 4 * self.in_parent.len() + 4 * self.children.len()
+        let lists = self.places.len() + self.in_parent.len() + self.groups_in_parent.len() + self.children.len();
+        4 * lists + 8 * self.diagonal.len() + size_of::<Front>() * self.fronts.len()
     }
 
     /// Bytes of a workspace.
     pub(crate) fn workspace_bytes(&self) -> usize {
-        8 * (self.front_max + self.stack_max)
+        8 * (2 * self.panel_max + self.stack_max.iter().sum::<usize>())
     }
 
     pub(crate) fn workspace(&self) -> Workspace {
-        Workspace { front: vec![0.0; self.front_max], stack: vec![0.0; self.stack_max], ..Workspace::default() }
+        let stacks = self.stack_max.map(|most| vec![0.0; most]);
+        Workspace { panel: vec![0.0; self.panel_max], stacks, minus: Vec::new() }
+    }
+
+    fn children(&self, number: usize) -> &[u32] {
+        let end = self.fronts.get(number + 1).map_or(self.children.len(), |next| next.children);
+        &self.children[self.fronts[number].children..end]
     }
 }
 
@@ -159,187 +216,338 @@ pub(crate) fn factor_with<A: Arithmetic, const R: usize, const HIGH: usize, cons
     pivots: &mut Pivots,
 ) {
     let layout = packed.layout.clone();
-    workspace.waiting.clear();
-    let mut stack = 0;
+    let Workspace { panel, stacks: [even, odd], minus } = workspace;
     for (number, s) in layout.supernodes.iter().enumerate() {
-        let side = s.side();
-        let front = &mut workspace.front[..side * side];
-        for (j, column) in front.chunks_exact_mut(side).enumerate() {
-            column[j..].fill(0.0);
-        }
+        let (side, below) = (s.side(), s.update_side());
+        let Front { stack, at, .. } = tree.fronts[number];
+        let (own, others) = if stack == 0 { (&mut *even, &*odd) } else { (&mut *odd, &*even) };
+        let panel = &mut panel[..side * s.width];
+        panel.fill(0.0);
         for row in s.begin..s.begin + s.width {
             let entries = tree.diagonal[row]..matrix.start[row + 1];
             for (&place, value) in tree.places[entries.clone()].iter().zip(&matrix.values[entries]) {
-                front[place as usize] = *value;
+                panel[place as usize] = *value;
             }
-            front[(row - s.begin) * (side + 1)] -= shift;
+            panel[(row - s.begin) * (side + 1)] -= shift;
         }
-        for _ in 0..tree.children[number] {
-            let Some(child) = workspace.waiting.pop() else { continue };
-            let child = &layout.supernodes[child as usize];
-            let below = child.update_side();
-            stack -= below * below;
-            add_update(&workspace.stack[stack..][..below * below], &tree.in_parent[child.rows..][..below], front, side);
+        for &child in tree.children(number) {
+            let Front { at, shared, .. } = tree.fronts[child as usize];
+            let update = Update::new(tree, &layout.supernodes[child as usize], &others[at..]);
+            update.add(0..shared, panel, side, 0);
         }
-        workspace.pivots.clear();
-        for first in (0..s.width).step_by(TOGETHER) {
-            let end = (first + TOGETHER).min(s.width);
-            for column in first..end {
-                eliminate::<A>(front, side, (first, column), &mut workspace.pivots);
+        let minus_len = s.len();
+        if minus.len() < minus_len {
+            minus.resize(minus_len, ZERO);
+        }
+        let columns = &mut packed.values[s.diagonal..s.diagonal + minus_len];
+        eliminate::<A, HIGH, P>(s, panel, columns, minus, &mut packed.inverse[s.begin..], pivots);
+        if below > 0 {
+            let update = &mut own[at..at + below * below];
+            make_update::<A, HIGH, P>(s, columns, minus, update);
+            for &child in tree.children(number) {
+                let Front { at, shared, below: end, .. } = tree.fronts[child as usize];
+                let child = Update::new(tree, &layout.supernodes[child as usize], &others[at..]);
+                child.add(shared..end, update, below, s.head());
             }
-            let rest = end.next_multiple_of(WIDTH);
-            let (panel, scaled) = (&mut workspace.panel, &mut workspace.scaled);
-            copy(front, side, (first, end), rest, &workspace.pivots, panel, scaled);
-            update::<A, HIGH, P>(front, side, rest, end - first, panel, scaled);
         }
-        pack(front, s, &workspace.pivots, packed, pivots);
-        let (head, below) = (s.head(), s.update_side());
-        for (j, to) in workspace.stack[stack..][..below * below].chunks_exact_mut(below.max(1)).enumerate() {
-            to[j..].copy_from_slice(&front[(head + j) * side + head + j..][..below - j]);
-        }
-        stack += below * below;
-        workspace.waiting.push(number as u32);
     }
 }
 
-/// Adds a child's update, a column-major lower triangle, to the front of its parent.
-#[inline(always)]
-fn add_update(update: &[f64], places: &[u32], front: &mut [f64], side: usize) {
-    let below = places.len();
-    for (j, column) in update.chunks_exact(below.max(1)).enumerate() {
-        let to = &mut front[places[j] as usize * side..][..side];
-        let first = j.next_multiple_of(WIDTH).min(below);
-        add_at(to, &column[j..first], &places[j..first]);
-        for (values, places) in
-            column[first..].as_chunks::<WIDTH>().0.iter().zip(places[first..].as_chunks::<WIDTH>().0)
-        {
-            let start = places[0] as usize;
-            match to.get_mut(start..start + WIDTH) {
-                // Rows of a child are mostly neighbours in its parent, too.
-                Some(to) if places[WIDTH - 1] as usize == start + WIDTH - 1 => {
-                    to.iter_mut().zip(values).for_each(|(to, value)| *to += value);
+/// What a supernode leaves to its parent.
+struct Update<'a> {
+    /// Column-major, the lower triangle and whole tiles of 8 × 8 on the diagonal.
+    values: &'a [f64],
+    /// Where its rows are in the front of the parent, and its groups of rows, as in [`Tree`].
+    places: &'a [u32],
+    groups: &'a [u32],
+}
+
+impl<'a> Update<'a> {
+    #[inline(always)]
+    fn new(tree: &'a Tree, s: &Supernode, values: &'a [f64]) -> Update<'a> {
+        let places = &tree.in_parent[s.rows..][..s.update_side()];
+        Update { values, places, groups: &tree.groups_in_parent[s.rows / WIDTH..][..s.groups] }
+    }
+
+    /// Adds some of its columns to those of its parent, which have `side` rows from place `first` on.
+    #[inline(always)]
+    fn add(&self, columns: Range<usize>, to: &mut [f64], side: usize, first: usize) {
+        let below = self.places.len();
+        for h in columns.start / WIDTH..columns.end.div_ceil(WIDTH) {
+            let of_tile = columns.start.max(WIDTH * h)..columns.end.min(WIDTH * (h + 1));
+            for g in h..self.groups.len() {
+                let places = &self.places[WIDTH * g..WIDTH * (g + 1)];
+                let start = self.groups[g] as usize;
+                // Above the diagonal there may be anything on both sides.
+                if start >= first && start + WIDTH - first <= side {
+                    for j in of_tile.clone() {
+                        let to = row_mut(to, (self.places[j] as usize - first) * side + start - first);
+                        let values = row(self.values, j * below + WIDTH * g);
+                        for k in 0..WIDTH {
+                            to[k] += values[k];
+                        }
+                    }
+                } else if g > h && places[WIDTH - 1] != NOWHERE {
+                    for j in of_tile.clone() {
+                        let to = &mut to[(self.places[j] as usize - first) * side..][..side];
+                        let values = row(self.values, j * below + WIDTH * g);
+                        for k in 0..WIDTH {
+                            to[places[k] as usize - first] += values[k];
+                        }
+                    }
+                } else {
+                    for j in of_tile.clone() {
+                        let to = &mut to[(self.places[j] as usize - first) * side..][..side];
+                        let values = row(self.values, j * below + WIDTH * g);
+                        for k in j.saturating_sub(WIDTH * g)..WIDTH {
+                            if places[k] != NOWHERE {
+                                to[places[k] as usize - first] += values[k];
+                            }
+                        }
+                    }
                 }
-                _ => add_at(to, values, places),
             }
         }
     }
 }
 
-/// Adds values to entries at such places.
+/// Where the rows of a group start among a supernode's columns: those of its diagonal block first, then those below.
 #[inline(always)]
-fn add_at(to: &mut [f64], values: &[f64], places: &[u32]) {
-    for (value, &place) in values.iter().zip(places) {
-        to[place as usize] += value;
+fn start(s: &Supernode, group: usize) -> usize {
+    match group.checked_sub(s.width.div_ceil(WIDTH)) {
+        Some(group) => s.below - s.diagonal + group * s.stride,
+        None => WIDTH * (group * (group + 1) / 2),
     }
 }
 
-/// Eliminates a column: takes off it what those from `first` on owe it, and divides by its pivot.
+/// Eliminates a supernode's columns: L into `columns`, −L D into `minus`.
 #[inline(always)]
-fn eliminate<A: Arithmetic>(front: &mut [f64], side: usize, (first, column): (usize, usize), pivots: &mut Vec<f64>) {
-    let (before, rest) = front.split_at_mut(column * side);
-    let own = &mut rest[column..side];
-    let source = |j: usize| &before[j * side + column..(j + 1) * side];
-    let mut j = first;
-    while j + WIDTH <= column {
-        let from: [&[f64]; WIDTH] = std::array::from_fn(|k| &source(j + k)[..own.len()]);
-        let minus: Row = std::array::from_fn(|k| -from[k][0] * pivots[j + k]);
-        for (i, own) in own.iter_mut().enumerate() {
-            for k in 0..WIDTH {
-                *own = A::fma(minus[k], from[k][i], *own);
+fn eliminate<A: Arithmetic, const HIGH: usize, const P: usize>(
+    s: &Supernode,
+    panel: &mut [f64],
+    columns: &mut [Row],
+    minus: &mut [Row],
+    inverse: &mut [f64],
+    pivots: &mut Pivots,
+) {
+    let blocks = s.width.div_ceil(WIDTH);
+    for first in (0..blocks).step_by(TOGETHER) {
+        let end = (first + TOGETHER).min(blocks);
+        if first > 0 {
+            for g in first..end {
+                take_before::<A, HIGH, 1>(s, (first, g + 1), g, panel, columns, minus);
             }
+            in_groups!(P, blocks + s.groups - end, g, N => {
+                take_before::<A, HIGH, N>(s, (first, end), end + g, panel, columns, minus);
+            });
         }
-        j += WIDTH;
+        for b in first..end {
+            let count = (s.width - WIDTH * b).min(WIDTH);
+            let at = (WIDTH * first, b);
+            for_length!(count, eliminate_block::<A, P>(s, at, panel, columns, minus, inverse, pivots));
+        }
     }
-    for (j, pivot) in pivots.iter().enumerate().skip(j) {
-        let from = source(j);
-        let minus = -from[0] * pivot;
-        own.iter_mut().zip(from).for_each(|(own, from)| *own = A::fma(minus, *from, *own));
-    }
-    let pivot = own[0];
-    pivots.push(pivot);
-    let inverse = 1.0 / pivot;
-    own[1..].iter_mut().for_each(|entry| *entry *= inverse);
 }
 
-/// Copies the eliminated columns into groups of eight rows, from row `rest` on: as they are, and times D.
+/// Takes off N groups of rows from number `g` on, in the blocks of columns `first..end`, what the columns before those
+/// owe.
 #[inline(always)]
-fn copy(
-    front: &[f64],
-    side: usize,
+fn take_before<A: Arithmetic, const HIGH: usize, const N: usize>(
+    s: &Supernode,
     (first, end): (usize, usize),
-    rest: usize,
-    pivots: &[f64],
-    panel: &mut Vec<Row>,
-    scaled: &mut Vec<Row>,
+    g: usize,
+    panel: &mut [f64],
+    columns: &[Row],
+    minus: &[Row],
 ) {
-    let (columns, groups) = (end - first, (side - rest) / WIDTH);
-    panel.resize(columns * groups, ZERO);
-    scaled.resize(columns * groups, ZERO);
-    for (j, pivot) in (first..end).zip(&pivots[first..]) {
-        for (g, rows) in front[j * side + rest..(j + 1) * side].as_chunks().0.iter().enumerate() {
-            panel[g * columns + j - first] = *rows;
-            scaled[g * columns + j - first] = rows.map(|x| x * pivot);
+    let side = s.side();
+    let before = WIDTH * first;
+    let mut rows = [&columns[..0]; N];
+    for p in 0..N {
+        rows[p] = &columns[start(s, g + p)..][..before];
+    }
+    for b in first..end {
+        let of_block = &minus[start(s, b)..][..before];
+        let count = (s.width - WIDTH * b).min(WIDTH);
+        for high in (0..count).step_by(HIGH) {
+            let mut sum = [[A::splat(0.0); HIGH]; N];
+            for p in 0..N {
+                for a in 0..HIGH.min(count - high) {
+                    sum[p][a] = A::load(row(panel, (WIDTH * b + high + a) * side + WIDTH * (g + p)));
+                }
+            }
+            add_outer::<A, HIGH, N>(of_block, high, rows, 0, &mut sum);
+            for p in 0..N {
+                for a in 0..HIGH.min(count - high) {
+                    A::store(sum[p][a], row_mut(panel, (WIDTH * b + high + a) * side + WIDTH * (g + p)));
+                }
+            }
         }
     }
 }
 
-/// Takes L D Lᵀ of the eliminated columns off the rest of the front.
+/// Eight entries of a column.
 #[inline(always)]
-fn update<A: Arithmetic, const HIGH: usize, const P: usize>(
-    front: &mut [f64],
-    side: usize,
-    rest: usize,
-    columns: usize,
-    panel: &[Row],
-    scaled: &[Row],
+fn row(column: &[f64], at: usize) -> &Row {
+    &column[at..at + WIDTH].as_chunks().0[0]
+}
+
+#[inline(always)]
+fn row_mut(column: &mut [f64], at: usize) -> &mut Row {
+    &mut column[at..at + WIDTH].as_chunks_mut().0[0]
+}
+
+/// Eliminates block `b` of columns, C of them, which owe something to those from `first` on.
+#[inline(always)]
+fn eliminate_block<A: Arithmetic, const C: usize, const P: usize>(
+    s: &Supernode,
+    (first, b): (usize, usize),
+    panel: &[f64],
+    columns: &mut [Row],
+    minus: &mut [Row],
+    inverse: &mut [f64],
+    pivots: &mut Pivots,
 ) {
-    let groups = (side - rest) / WIDTH;
-    let of_panel = |g: usize| &panel[g * columns..][..columns];
-    for h in 0..groups {
-        let right = &scaled[h * columns..][..columns];
-        in_groups!(P, groups - h, g, N => {
-            let mut tiles = [SMALL_ZERO; N];
-            outer::<A, HIGH, N>(right, std::array::from_fn(|p| of_panel(h + g + p)), 0, &mut tiles);
-            for (p, tile) in tiles.iter().enumerate() {
-                subtract(front, side, rest + WIDTH * (h + g + p), rest + WIDTH * h, tile);
+    let (side, column, own) = (s.side(), WIDTH * b, start(s, b));
+    let mut block = Eliminated { first, column, own, triangle: [ZERO; C], inverses: ZERO, most: ZERO };
+
+    let mut sum = [[A::splat(0.0); C]; 1];
+    for a in 0..C {
+        sum[0][a] = A::load(row(panel, (column + a) * side + column));
+    }
+    let before = own + first..own + column;
+    add_outer::<A, C, 1>(&minus[before.clone()], 0, [&columns[before]], 0, &mut sum);
+    let mut tile = [ZERO; C];
+    for a in 0..C {
+        A::store(sum[0][a], &mut tile[a]);
+    }
+    for j in 0..C {
+        let owed = tile[j];
+        let pivot = owed[j];
+        pivots.negative += usize::from(pivot < 0.0);
+        pivots.least = if pivot.is_nan() { f64::NAN } else { pivots.least.min(pivot.abs()) };
+        let one_by = 1.0 / pivot;
+        block.inverses[j] = one_by;
+        inverse[column + j] = one_by;
+        let mut eliminated = ZERO;
+        for k in 0..WIDTH {
+            eliminated[k] = if k > j { owed[k] * one_by } else { 0.0 };
+            block.triangle[j][k] = -eliminated[k];
+            block.most[k] = if eliminated[k].abs() > block.most[k] { eliminated[k].abs() } else { block.most[k] };
+        }
+        for a in j + 1..C {
+            for k in 0..WIDTH {
+                tile[a][k] = A::fma(-owed[a], eliminated[k], tile[a][k]);
+            }
+        }
+        if s.width > 1 {
+            columns[own + column + j] = eliminated;
+        }
+    }
+
+    in_groups!(P, s.side() / WIDTH - b - 1, g, N => {
+        block.go_on::<A, N>(s, b + 1 + g, panel, columns, minus);
+    });
+    for k in 0..WIDTH {
+        pivots.growth = if block.most[k] > pivots.growth { block.most[k] } else { pivots.growth };
+    }
+}
+
+/// A block of C columns of which the triangle has been eliminated.
+struct Eliminated<const C: usize> {
+    /// The first column that it owes something.
+    first: usize,
+    /// The first column of its own, and where its first row starts.
+    column: usize,
+    own: usize,
+    /// The columns of the triangle, but for its diagonal, negative.
+    triangle: [Row; C],
+    /// D⁻¹.
+    inverses: Row,
+    /// The largest |L| so far.
+    most: Row,
+}
+
+impl<const C: usize> Eliminated<C> {
+    /// Eliminates the columns in N groups of rows from number `g` on.
+    #[inline(always)]
+    fn go_on<A: Arithmetic, const N: usize>(
+        &mut self,
+        s: &Supernode,
+        g: usize,
+        panel: &[f64],
+        columns: &mut [Row],
+        minus: &mut [Row],
+    ) {
+        let (side, before) = (s.side(), self.column - self.first);
+        let mut sum = [[A::splat(0.0); C]; N];
+        let mut starts = [0; N];
+        for p in 0..N {
+            starts[p] = start(s, g + p) + self.column;
+            for a in 0..C {
+                sum[p][a] = A::load(row(panel, (self.column + a) * side + WIDTH * (g + p)));
+            }
+        }
+        if before > 0 {
+            let mut rows = [&columns[..0]; N];
+            for p in 0..N {
+                rows[p] = &columns[starts[p] - before..starts[p]];
+            }
+            add_outer::<A, C, N>(&minus[self.own + self.first..][..before], 0, rows, 0, &mut sum);
+        }
+        for j in 0..C {
+            for a in j + 1..C {
+                let entry = A::splat(self.triangle[j][a]);
+                for p in 0..N {
+                    sum[p][a] = A::multiply_add(entry, sum[p][j], sum[p][a]);
+                }
+            }
+        }
+        let (zero, minus_one) = (A::splat(0.0), A::splat(-1.0));
+        for p in 0..N {
+            let (columns, minus) = (&mut columns[starts[p]..][..C], &mut minus[starts[p]..][..C]);
+            for a in 0..C {
+                A::store(A::multiply_add(A::splat(self.inverses[a]), sum[p][a], zero), &mut columns[a]);
+                A::store(A::multiply_add(minus_one, sum[p][a], zero), &mut minus[a]);
+            }
+            for column in columns {
+                for k in 0..WIDTH {
+                    self.most[k] = if column[k].abs() > self.most[k] { column[k].abs() } else { self.most[k] };
+                }
+            }
+        }
+    }
+}
+
+/// −L D Lᵀ of the rows below a supernode.
+#[inline(always)]
+fn make_update<A: Arithmetic, const HIGH: usize, const P: usize>(
+    s: &Supernode,
+    columns: &[Row],
+    minus: &[Row],
+    update: &mut [f64],
+) {
+    let (width, side, blocks) = (s.width, s.update_side(), s.width.div_ceil(WIDTH));
+    for first in (0..s.groups).step_by(TOGETHER) {
+        in_groups!(P, s.groups - first, g, N => {
+            let mut rows = [&columns[..0]; N];
+            for p in 0..N {
+                rows[p] = &columns[start(s, blocks + first + g + p)..][..width];
+            }
+            // Above the diagonal there may be anything.
+            for h in first..(first + TOGETHER).min(first + g + N) {
+                let of_block = &minus[start(s, blocks + h)..][..width];
+                for high in (0..WIDTH).step_by(HIGH) {
+                    let mut sum = [[A::splat(0.0); HIGH]; N];
+                    add_outer::<A, HIGH, N>(of_block, high, rows, 0, &mut sum);
+                    for p in 0..N {
+                        for a in 0..HIGH {
+                            let at = (WIDTH * h + high + a) * side + WIDTH * (first + g + p);
+                            A::store(sum[p][a], row_mut(update, at));
+                        }
+                    }
+                }
             }
         });
     }
-}
-
-#[inline(always)]
-fn subtract(front: &mut [f64], side: usize, row: usize, column: usize, tile: &[Row; WIDTH]) {
-    for (a, from) in tile.iter().enumerate() {
-        let to = &mut front[(column + a) * side + row..][..WIDTH];
-        for k in 0..WIDTH {
-            to[k] -= from[k];
-        }
-    }
-}
-
-/// Writes a supernode's columns to where the solve wants them, and notes its pivots. What fills up groups there is zero
-/// from the start and never written to.
-#[inline(always)]
-fn pack(front: &[f64], s: &Supernode, own: &[f64], packed: &mut Packed, pivots: &mut Pivots) {
-    let (side, head) = (s.side(), s.head());
-    let (values, inverse) = (&mut packed.values[..], &mut packed.inverse);
-    let mut most = ZERO;
-    for (j, &pivot) in own.iter().enumerate() {
-        pivots.negative += usize::from(pivot < 0.0);
-        pivots.least = if pivot.is_nan() { f64::NAN } else { pivots.least.min(pivot.abs()) };
-        inverse[s.begin + j] = 1.0 / pivot;
-        let column = &front[j * side..][..side];
-        for (i, &entry) in column[..s.width].iter().enumerate().skip(j + 1) {
-            most[0] = if entry.abs() > most[0] { entry.abs() } else { most[0] };
-            let group = i / WIDTH;
-            values[s.diagonal + WIDTH * (group * (group + 1) / 2) + j][i % WIDTH] = entry;
-        }
-        for (g, rows) in column[head..].as_chunks().0.iter().enumerate() {
-            values[s.below + g * s.stride + j] = *rows;
-            for k in 0..WIDTH {
-                most[k] = if rows[k].abs() > most[k] { rows[k].abs() } else { most[k] };
-            }
-        }
-    }
-    pivots.growth = most.iter().fold(pivots.growth, |most, x| x.max(most));
 }

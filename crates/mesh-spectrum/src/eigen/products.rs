@@ -58,8 +58,39 @@ macro_rules! in_groups {
 }
 pub(crate) use in_groups;
 
-/// out_p += Qᵀ W_p for P blocks, HIGH columns of Q at once: an entry of Q, once read, serves all blocks. Rows of Q are asked
-/// for so many `ahead`, or not if that is 0.
+/// Σ_p += Q_Cᵀ W_p for P blocks, Q_C being the C columns of Q from number `high` on: an entry of Q, once read, serves all
+/// blocks. Rows of Q are asked for so many `ahead`, or not if that is 0.
+#[inline(always)]
+pub(crate) fn add_outer<A: Arithmetic, const C: usize, const P: usize>(
+    q: &[Row],
+    high: usize,
+    w: [&[Row]; P],
+    ahead: usize,
+    sum: &mut [[A::Lanes; C]; P],
+) {
+    let rows = q.len();
+    let mut of_block = [&q[..0]; P];
+    for p in 0..P {
+        of_block[p] = &w[p][..rows];
+    }
+    let mut of_row = [A::splat(0.0); P];
+    for i in 0..rows {
+        if ahead > 0 {
+            prefetch(q, i + ahead);
+        }
+        for p in 0..P {
+            of_row[p] = A::load(&of_block[p][i]);
+        }
+        for a in 0..C {
+            let entry = A::splat(q[i][high + a]);
+            for p in 0..P {
+                sum[p][a] = A::multiply_add(entry, of_row[p], sum[p][a]);
+            }
+        }
+    }
+}
+
+/// out_p += Qᵀ W_p for P blocks, HIGH columns of Q at once.
 #[inline(always)]
 pub(crate) fn outer<A: Arithmetic, const HIGH: usize, const P: usize>(
     q: &[Row],
@@ -67,8 +98,6 @@ pub(crate) fn outer<A: Arithmetic, const HIGH: usize, const P: usize>(
     ahead: usize,
     out: &mut [Small; P],
 ) {
-    let rows = q.len();
-    let w = w.map(|w| &w[..rows]);
     for high in (0..WIDTH).step_by(HIGH) {
         let mut sum = [[A::splat(0.0); HIGH]; P];
         for p in 0..P {
@@ -76,21 +105,7 @@ pub(crate) fn outer<A: Arithmetic, const HIGH: usize, const P: usize>(
                 sum[p][a] = A::load(&out[p][high + a]);
             }
         }
-        let mut of_row = [A::splat(0.0); P];
-        for i in 0..rows {
-            if ahead > 0 && high == 0 {
-                prefetch(q, i + ahead);
-            }
-            for p in 0..P {
-                of_row[p] = A::load(&w[p][i]);
-            }
-            for a in 0..HIGH {
-                let entry = A::splat(q[i][high + a]);
-                for p in 0..P {
-                    sum[p][a] = A::multiply_add(entry, of_row[p], sum[p][a]);
-                }
-            }
-        }
+        add_outer::<A, HIGH, P>(q, high, w, if high == 0 { ahead } else { 0 }, &mut sum);
         for p in 0..P {
             for a in 0..HIGH {
                 A::store(sum[p][a], &mut out[p][high + a]);

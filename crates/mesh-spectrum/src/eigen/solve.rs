@@ -111,19 +111,20 @@ fn group<A: Arithmetic, const HIGH: usize>(values: &[Row], first: usize, x: &[Ro
 /// Calls a function for a triangle of so many rows, at most eight: a number that the compiler knows, so that all of them
 /// stay in registers.
 macro_rules! for_length {
-    ($length:expr, $name:ident::<$a:ident>($($arg:expr),*)) => {
+    ($length:expr, $name:ident::<$a:ident $(, $more:ident)*>($($arg:expr),*)) => {
         match $length {
-            1 => $name::<$a, 1>($($arg),*),
-            2 => $name::<$a, 2>($($arg),*),
-            3 => $name::<$a, 3>($($arg),*),
-            4 => $name::<$a, 4>($($arg),*),
-            5 => $name::<$a, 5>($($arg),*),
-            6 => $name::<$a, 6>($($arg),*),
-            7 => $name::<$a, 7>($($arg),*),
-            _ => $name::<$a, 8>($($arg),*),
+            1 => $name::<$a, 1 $(, $more)*>($($arg),*),
+            2 => $name::<$a, 2 $(, $more)*>($($arg),*),
+            3 => $name::<$a, 3 $(, $more)*>($($arg),*),
+            4 => $name::<$a, 4 $(, $more)*>($($arg),*),
+            5 => $name::<$a, 5 $(, $more)*>($($arg),*),
+            6 => $name::<$a, 6 $(, $more)*>($($arg),*),
+            7 => $name::<$a, 7 $(, $more)*>($($arg),*),
+            _ => $name::<$a, 8 $(, $more)*>($($arg),*),
         }
     };
 }
+pub(crate) use for_length;
 
 /// x ← T⁻¹ (x − known), T the unit lower triangle whose column j is `triangle[j]`.
 #[inline(always)]
