@@ -371,15 +371,15 @@ fn take_before<A: Arithmetic, const HIGH: usize, const N: usize>(
         let count = (s.width - WIDTH * b).min(WIDTH);
         for high in (0..count).step_by(HIGH) {
             let mut sum = [[A::splat(0.0); HIGH]; N];
-            for p in 0..N {
-                for a in 0..HIGH.min(count - high) {
-                    sum[p][a] = A::load(row(panel, (WIDTH * b + high + a) * side + WIDTH * (g + p)));
+            for (p, sum) in sum.iter_mut().enumerate() {
+                for (a, sum) in sum.iter_mut().enumerate().take(count - high) {
+                    *sum = A::load(row(panel, (WIDTH * b + high + a) * side + WIDTH * (g + p)));
                 }
             }
             add_outer::<A, HIGH, N>(of_block, high, rows, 0, &mut sum);
-            for p in 0..N {
-                for a in 0..HIGH.min(count - high) {
-                    A::store(sum[p][a], row_mut(panel, (WIDTH * b + high + a) * side + WIDTH * (g + p)));
+            for (p, sum) in sum.iter().enumerate() {
+                for (a, sum) in sum.iter().enumerate().take(count - high) {
+                    A::store(*sum, row_mut(panel, (WIDTH * b + high + a) * side + WIDTH * (g + p)));
                 }
             }
         }
@@ -412,8 +412,8 @@ fn eliminate_block<A: Arithmetic, const C: usize, const P: usize>(
     let mut block = Eliminated { first, column, own, triangle: [ZERO; C], inverses: ZERO, most: ZERO };
 
     let mut sum = [[A::splat(0.0); C]; 1];
-    for a in 0..C {
-        sum[0][a] = A::load(row(panel, (column + a) * side + column));
+    for (a, sum) in sum[0].iter_mut().enumerate() {
+        *sum = A::load(row(panel, (column + a) * side + column));
     }
     let before = own + first..own + column;
     add_outer::<A, C, 1>(&minus[before.clone()], 0, [&columns[before]], 0, &mut sum);
@@ -484,8 +484,8 @@ impl<const C: usize> Eliminated<C> {
         let mut starts = [0; N];
         for p in 0..N {
             starts[p] = start(s, g + p) + self.column;
-            for a in 0..C {
-                sum[p][a] = A::load(row(panel, (self.column + a) * side + WIDTH * (g + p)));
+            for (a, sum) in sum[p].iter_mut().enumerate() {
+                *sum = A::load(row(panel, (self.column + a) * side + WIDTH * (g + p)));
             }
         }
         if before > 0 {
@@ -498,8 +498,8 @@ impl<const C: usize> Eliminated<C> {
         for j in 0..C {
             for a in j + 1..C {
                 let entry = A::splat(self.triangle[j][a]);
-                for p in 0..N {
-                    sum[p][a] = A::multiply_add(entry, sum[p][j], sum[p][a]);
+                for sum in &mut sum {
+                    sum[a] = A::multiply_add(entry, sum[j], sum[a]);
                 }
             }
         }
@@ -511,8 +511,8 @@ impl<const C: usize> Eliminated<C> {
                 A::store(A::multiply_add(minus_one, sum[p][a], zero), &mut minus[a]);
             }
             for column in columns {
-                for k in 0..WIDTH {
-                    self.most[k] = if column[k].abs() > self.most[k] { column[k].abs() } else { self.most[k] };
+                for (most, entry) in self.most.iter_mut().zip(column) {
+                    *most = if entry.abs() > *most { entry.abs() } else { *most };
                 }
             }
         }
@@ -540,10 +540,10 @@ fn make_update<A: Arithmetic, const HIGH: usize, const P: usize>(
                 for high in (0..WIDTH).step_by(HIGH) {
                     let mut sum = [[A::splat(0.0); HIGH]; N];
                     add_outer::<A, HIGH, N>(of_block, high, rows, 0, &mut sum);
-                    for p in 0..N {
-                        for a in 0..HIGH {
+                    for (p, sum) in sum.iter().enumerate() {
+                        for (a, sum) in sum.iter().enumerate() {
                             let at = (WIDTH * h + high + a) * side + WIDTH * (first + g + p);
-                            A::store(sum[p][a], row_mut(update, at));
+                            A::store(*sum, row_mut(update, at));
                         }
                     }
                 }
