@@ -1,6 +1,6 @@
 //! L D Lᵀ x = b for eight right-hand sides at once.
 //!
-//! The factor is repacked from the library's column-major supernodes into groups of eight rows: one `Row` holds eight
+//! The factor is stored in groups of eight rows of a supernode: one `Row` holds eight
 //! rows' entries of one column, so that every inner loop is "eight entries of L times a row of x" on whole cache
 //! lines, and the index of a row is read once for eight right-hand sides.
 
