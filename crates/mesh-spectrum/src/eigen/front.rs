@@ -14,18 +14,17 @@
 //! tiles of 8 × 8. Eliminated columns go straight to where the solve wants them, eight rows of a column together, which
 //! is also what products want.
 
+mod eliminate;
+
 use std::ops::Range;
 
 use crate::eigen::arithmetic::Arithmetic;
 use crate::eigen::block::{Row, WIDTH, ZERO};
 use crate::eigen::factor::Pivots;
-use crate::eigen::products::{add_outer, in_groups};
-use crate::eigen::solve::{Layout, Packed, Supernode, for_length};
+use crate::eigen::solve::{Layout, Packed, Supernode};
 use crate::operator::Csr;
 
-/// Blocks of eight columns that what was eliminated before them is taken off together, and blocks of an update that are
-/// made together: the rows that all of them take stay in a core's cache meanwhile.
-const TOGETHER: usize = 4;
+use self::eliminate::{eliminate, make_update, row, row_mut};
 
 /// Fronts of more rows than this are refused: places in them are 32-bit numbers, and they take 30 GB.
 const ROWS_MAX: usize = 65_000;
@@ -47,6 +46,7 @@ pub(crate) struct Tree {
     /// Children of all supernodes, one's after another's.
     children: Vec<u32>,
     panel_max: usize,
+    columns_max: usize,
     stack_max: [usize; 2],
 }
 
@@ -60,7 +60,7 @@ struct Front {
     at: usize,
     /// How many of its rows below are columns of its parent, and how many there are.
     shared: usize,
-    below: usize,
+    rows: usize,
 }
 
 /// What a factorisation needs beside its result.
@@ -104,8 +104,7 @@ impl Tree {
             supernode_of[s.begin..s.begin + s.width].fill(number as u32);
         }
         // Children of each, by the supernode that holds their first row below.
-        let first_below = |s: &Supernode| layout.rows[s.rows..].first().copied().filter(|_| s.groups > 0);
-        let parent = |s: &Supernode| first_below(s).map(|row| supernode_of[row as usize] as usize);
+        let parent = |s: &Supernode| (s.groups > 0).then(|| supernode_of[layout.rows[s.rows] as usize] as usize);
         let mut of_parent: Vec<Vec<u32>> = vec![Vec::new(); supernodes.len()];
         for (number, s) in supernodes.iter().enumerate() {
             parent(s).into_iter().for_each(|parent| of_parent[parent].push(number as u32));
@@ -122,6 +121,7 @@ impl Tree {
             fronts,
             children: of_parent.concat(),
             panel_max: 0,
+            columns_max: 0,
             stack_max: [0; 2],
         };
         let mut place = vec![0u32; n];
@@ -150,7 +150,7 @@ impl Tree {
                 let child = &supernodes[child as usize];
                 let rows = &layout.rows[child.rows..][..child.update_side()];
                 front.shared = rows.partition_point(|&row| (row as usize) < s.begin + s.width);
-                front.below = rows.partition_point(|&row| (row as usize) < n);
+                front.rows = rows.partition_point(|&row| (row as usize) < n);
                 for group in (child.rows..child.rows + child.update_side()).step_by(WIDTH) {
                     let places = &mut tree.in_parent[group..group + WIDTH];
                     for (to, &row) in places.iter_mut().zip(&layout.rows[group..]) {
@@ -174,6 +174,7 @@ impl Tree {
             taken[stack] += below * below;
             tree.stack_max[stack] = tree.stack_max[stack].max(taken[stack]);
             tree.panel_max = tree.panel_max.max(side * s.width);
+            tree.columns_max = tree.columns_max.max(s.len());
         }
         Some(tree)
     }
@@ -191,12 +192,12 @@ impl Tree {
 
     /// Bytes of a workspace.
     pub(crate) fn workspace_bytes(&self) -> usize {
-        8 * (2 * self.panel_max + self.stack_max.iter().sum::<usize>())
+        8 * (self.panel_max + WIDTH * self.columns_max + self.stack_max.iter().sum::<usize>())
     }
 
     pub(crate) fn workspace(&self) -> Workspace {
         let stacks = self.stack_max.map(|most| vec![0.0; most]);
-        Workspace { panel: vec![0.0; self.panel_max], stacks, minus: Vec::new() }
+        Workspace { panel: vec![0.0; self.panel_max], stacks, minus: vec![ZERO; self.columns_max] }
     }
 
     fn children(&self, number: usize) -> &[u32] {
@@ -231,23 +232,17 @@ pub(crate) fn factor_with<A: Arithmetic, const R: usize, const HIGH: usize, cons
             panel[(row - s.begin) * (side + 1)] -= shift;
         }
         for &child in tree.children(number) {
-            let Front { at, shared, .. } = tree.fronts[child as usize];
-            let update = Update::new(tree, &layout.supernodes[child as usize], &others[at..]);
-            update.add(0..shared, panel, side, 0);
+            let child = Update::new(tree, &layout, child as usize, others);
+            child.add(0..child.shared, panel, side, 0);
         }
-        let minus_len = s.len();
-        if minus.len() < minus_len {
-            minus.resize(minus_len, ZERO);
-        }
-        let columns = &mut packed.values[s.diagonal..s.diagonal + minus_len];
+        let columns = &mut packed.values[s.diagonal..s.diagonal + s.len()];
         eliminate::<A, HIGH, P>(s, panel, columns, minus, &mut packed.inverse[s.begin..], pivots);
         if below > 0 {
             let update = &mut own[at..at + below * below];
             make_update::<A, HIGH, P>(s, columns, minus, update);
             for &child in tree.children(number) {
-                let Front { at, shared, below: end, .. } = tree.fronts[child as usize];
-                let child = Update::new(tree, &layout.supernodes[child as usize], &others[at..]);
-                child.add(shared..end, update, below, s.head());
+                let child = Update::new(tree, &layout, child as usize, others);
+                child.add(child.shared..child.rows, update, below, s.head());
             }
         }
     }
@@ -260,13 +255,18 @@ struct Update<'a> {
     /// Where its rows are in the front of the parent, and its groups of rows, as in [`Tree`].
     places: &'a [u32],
     groups: &'a [u32],
+    /// How many of its columns are columns of the parent, and how many there are but for what fills up a group.
+    shared: usize,
+    rows: usize,
 }
 
 impl<'a> Update<'a> {
     #[inline(always)]
-    fn new(tree: &'a Tree, s: &Supernode, values: &'a [f64]) -> Update<'a> {
+    fn new(tree: &'a Tree, layout: &Layout, number: usize, stack: &'a [f64]) -> Update<'a> {
+        let (s, Front { at, shared, rows, .. }) = (&layout.supernodes[number], tree.fronts[number]);
         let places = &tree.in_parent[s.rows..][..s.update_side()];
-        Update { values, places, groups: &tree.groups_in_parent[s.rows / WIDTH..][..s.groups] }
+        let groups = &tree.groups_in_parent[s.rows / WIDTH..][..s.groups];
+        Update { values: &stack[at..], places, groups, shared, rows }
     }
 
     /// Adds some of its columns to those of its parent, which have `side` rows from place `first` on.
@@ -277,277 +277,25 @@ impl<'a> Update<'a> {
             let of_tile = columns.start.max(WIDTH * h)..columns.end.min(WIDTH * (h + 1));
             for g in h..self.groups.len() {
                 let places = &self.places[WIDTH * g..WIDTH * (g + 1)];
-                let start = self.groups[g] as usize;
-                // Above the diagonal there may be anything on both sides.
-                if start >= first && start + WIDTH - first <= side {
-                    for j in of_tile.clone() {
-                        let to = row_mut(to, (self.places[j] as usize - first) * side + start - first);
-                        let values = row(self.values, j * below + WIDTH * g);
+                let neighbours = self.groups[g] != NOWHERE && self.groups[g] as usize >= first;
+                for j in of_tile.clone() {
+                    let to = &mut to[(self.places[j] as usize - first) * side..][..side];
+                    let values = row(self.values, j * below + WIDTH * g);
+                    // Above the diagonal there may be anything on both sides.
+                    if neighbours {
+                        let to = row_mut(to, self.groups[g] as usize - first);
                         for k in 0..WIDTH {
                             to[k] += values[k];
                         }
+                        continue;
                     }
-                } else if g > h && places[WIDTH - 1] != NOWHERE {
-                    for j in of_tile.clone() {
-                        let to = &mut to[(self.places[j] as usize - first) * side..][..side];
-                        let values = row(self.values, j * below + WIDTH * g);
-                        for k in 0..WIDTH {
+                    for k in j.saturating_sub(WIDTH * g)..WIDTH {
+                        if places[k] != NOWHERE {
                             to[places[k] as usize - first] += values[k];
                         }
                     }
-                } else {
-                    for j in of_tile.clone() {
-                        let to = &mut to[(self.places[j] as usize - first) * side..][..side];
-                        let values = row(self.values, j * below + WIDTH * g);
-                        for k in j.saturating_sub(WIDTH * g)..WIDTH {
-                            if places[k] != NOWHERE {
-                                to[places[k] as usize - first] += values[k];
-                            }
-                        }
-                    }
                 }
             }
         }
-    }
-}
-
-/// Where the rows of a group start among a supernode's columns: those of its diagonal block first, then those below.
-#[inline(always)]
-fn start(s: &Supernode, group: usize) -> usize {
-    match group.checked_sub(s.width.div_ceil(WIDTH)) {
-        Some(group) => s.below - s.diagonal + group * s.stride,
-        None => WIDTH * (group * (group + 1) / 2),
-    }
-}
-
-/// Eliminates a supernode's columns: L into `columns`, −L D into `minus`.
-#[inline(always)]
-fn eliminate<A: Arithmetic, const HIGH: usize, const P: usize>(
-    s: &Supernode,
-    panel: &mut [f64],
-    columns: &mut [Row],
-    minus: &mut [Row],
-    inverse: &mut [f64],
-    pivots: &mut Pivots,
-) {
-    let blocks = s.width.div_ceil(WIDTH);
-    for first in (0..blocks).step_by(TOGETHER) {
-        let end = (first + TOGETHER).min(blocks);
-        if first > 0 {
-            for g in first..end {
-                take_before::<A, HIGH, 1>(s, (first, g + 1), g, panel, columns, minus);
-            }
-            in_groups!(P, blocks + s.groups - end, g, N => {
-                take_before::<A, HIGH, N>(s, (first, end), end + g, panel, columns, minus);
-            });
-        }
-        for b in first..end {
-            let count = (s.width - WIDTH * b).min(WIDTH);
-            let at = (WIDTH * first, b);
-            for_length!(count, eliminate_block::<A, P>(s, at, panel, columns, minus, inverse, pivots));
-        }
-    }
-}
-
-/// Takes off N groups of rows from number `g` on, in the blocks of columns `first..end`, what the columns before those
-/// owe.
-#[inline(always)]
-fn take_before<A: Arithmetic, const HIGH: usize, const N: usize>(
-    s: &Supernode,
-    (first, end): (usize, usize),
-    g: usize,
-    panel: &mut [f64],
-    columns: &[Row],
-    minus: &[Row],
-) {
-    let side = s.side();
-    let before = WIDTH * first;
-    let mut rows = [&columns[..0]; N];
-    for p in 0..N {
-        rows[p] = &columns[start(s, g + p)..][..before];
-    }
-    for b in first..end {
-        let of_block = &minus[start(s, b)..][..before];
-        let count = (s.width - WIDTH * b).min(WIDTH);
-        for high in (0..count).step_by(HIGH) {
-            let mut sum = [[A::splat(0.0); HIGH]; N];
-            for (p, sum) in sum.iter_mut().enumerate() {
-                for (a, sum) in sum.iter_mut().enumerate().take(count - high) {
-                    *sum = A::load(row(panel, (WIDTH * b + high + a) * side + WIDTH * (g + p)));
-                }
-            }
-            add_outer::<A, HIGH, N>(of_block, high, rows, 0, &mut sum);
-            for (p, sum) in sum.iter().enumerate() {
-                for (a, sum) in sum.iter().enumerate().take(count - high) {
-                    A::store(*sum, row_mut(panel, (WIDTH * b + high + a) * side + WIDTH * (g + p)));
-                }
-            }
-        }
-    }
-}
-
-/// Eight entries of a column.
-#[inline(always)]
-fn row(column: &[f64], at: usize) -> &Row {
-    &column[at..at + WIDTH].as_chunks().0[0]
-}
-
-#[inline(always)]
-fn row_mut(column: &mut [f64], at: usize) -> &mut Row {
-    &mut column[at..at + WIDTH].as_chunks_mut().0[0]
-}
-
-/// Eliminates block `b` of columns, C of them, which owe something to those from `first` on.
-#[inline(always)]
-fn eliminate_block<A: Arithmetic, const C: usize, const P: usize>(
-    s: &Supernode,
-    (first, b): (usize, usize),
-    panel: &[f64],
-    columns: &mut [Row],
-    minus: &mut [Row],
-    inverse: &mut [f64],
-    pivots: &mut Pivots,
-) {
-    let (side, column, own) = (s.side(), WIDTH * b, start(s, b));
-    let mut block = Eliminated { first, column, own, triangle: [ZERO; C], inverses: ZERO, most: ZERO };
-
-    let mut sum = [[A::splat(0.0); C]; 1];
-    for (a, sum) in sum[0].iter_mut().enumerate() {
-        *sum = A::load(row(panel, (column + a) * side + column));
-    }
-    let before = own + first..own + column;
-    add_outer::<A, C, 1>(&minus[before.clone()], 0, [&columns[before]], 0, &mut sum);
-    let mut tile = [ZERO; C];
-    for a in 0..C {
-        A::store(sum[0][a], &mut tile[a]);
-    }
-    for j in 0..C {
-        let owed = tile[j];
-        let pivot = owed[j];
-        pivots.negative += usize::from(pivot < 0.0);
-        pivots.least = if pivot.is_nan() { f64::NAN } else { pivots.least.min(pivot.abs()) };
-        let one_by = 1.0 / pivot;
-        block.inverses[j] = one_by;
-        inverse[column + j] = one_by;
-        let mut eliminated = ZERO;
-        for k in 0..WIDTH {
-            eliminated[k] = if k > j { owed[k] * one_by } else { 0.0 };
-            block.triangle[j][k] = -eliminated[k];
-            block.most[k] = if eliminated[k].abs() > block.most[k] { eliminated[k].abs() } else { block.most[k] };
-        }
-        for a in j + 1..C {
-            for k in 0..WIDTH {
-                tile[a][k] = A::fma(-owed[a], eliminated[k], tile[a][k]);
-            }
-        }
-        if s.width > 1 {
-            columns[own + column + j] = eliminated;
-        }
-    }
-
-    in_groups!(P, s.side() / WIDTH - b - 1, g, N => {
-        block.go_on::<A, N>(s, b + 1 + g, panel, columns, minus);
-    });
-    for k in 0..WIDTH {
-        pivots.growth = if block.most[k] > pivots.growth { block.most[k] } else { pivots.growth };
-    }
-}
-
-/// A block of C columns of which the triangle has been eliminated.
-struct Eliminated<const C: usize> {
-    /// The first column that it owes something.
-    first: usize,
-    /// The first column of its own, and where its first row starts.
-    column: usize,
-    own: usize,
-    /// The columns of the triangle, but for its diagonal, negative.
-    triangle: [Row; C],
-    /// D⁻¹.
-    inverses: Row,
-    /// The largest |L| so far.
-    most: Row,
-}
-
-impl<const C: usize> Eliminated<C> {
-    /// Eliminates the columns in N groups of rows from number `g` on.
-    #[inline(always)]
-    fn go_on<A: Arithmetic, const N: usize>(
-        &mut self,
-        s: &Supernode,
-        g: usize,
-        panel: &[f64],
-        columns: &mut [Row],
-        minus: &mut [Row],
-    ) {
-        let (side, before) = (s.side(), self.column - self.first);
-        let mut sum = [[A::splat(0.0); C]; N];
-        let mut starts = [0; N];
-        for p in 0..N {
-            starts[p] = start(s, g + p) + self.column;
-            for (a, sum) in sum[p].iter_mut().enumerate() {
-                *sum = A::load(row(panel, (self.column + a) * side + WIDTH * (g + p)));
-            }
-        }
-        if before > 0 {
-            let mut rows = [&columns[..0]; N];
-            for p in 0..N {
-                rows[p] = &columns[starts[p] - before..starts[p]];
-            }
-            add_outer::<A, C, N>(&minus[self.own + self.first..][..before], 0, rows, 0, &mut sum);
-        }
-        for j in 0..C {
-            for a in j + 1..C {
-                let entry = A::splat(self.triangle[j][a]);
-                for sum in &mut sum {
-                    sum[a] = A::multiply_add(entry, sum[j], sum[a]);
-                }
-            }
-        }
-        let (zero, minus_one) = (A::splat(0.0), A::splat(-1.0));
-        for p in 0..N {
-            let (columns, minus) = (&mut columns[starts[p]..][..C], &mut minus[starts[p]..][..C]);
-            for a in 0..C {
-                A::store(A::multiply_add(A::splat(self.inverses[a]), sum[p][a], zero), &mut columns[a]);
-                A::store(A::multiply_add(minus_one, sum[p][a], zero), &mut minus[a]);
-            }
-            for column in columns {
-                for (most, entry) in self.most.iter_mut().zip(column) {
-                    *most = if entry.abs() > *most { entry.abs() } else { *most };
-                }
-            }
-        }
-    }
-}
-
-/// −L D Lᵀ of the rows below a supernode.
-#[inline(always)]
-fn make_update<A: Arithmetic, const HIGH: usize, const P: usize>(
-    s: &Supernode,
-    columns: &[Row],
-    minus: &[Row],
-    update: &mut [f64],
-) {
-    let (width, side, blocks) = (s.width, s.update_side(), s.width.div_ceil(WIDTH));
-    for first in (0..s.groups).step_by(TOGETHER) {
-        in_groups!(P, s.groups - first, g, N => {
-            let mut rows = [&columns[..0]; N];
-            for p in 0..N {
-                rows[p] = &columns[start(s, blocks + first + g + p)..][..width];
-            }
-            // Above the diagonal there may be anything.
-            for h in first..(first + TOGETHER).min(first + g + N) {
-                let of_block = &minus[start(s, blocks + h)..][..width];
-                for high in (0..WIDTH).step_by(HIGH) {
-                    let mut sum = [[A::splat(0.0); HIGH]; N];
-                    add_outer::<A, HIGH, N>(of_block, high, rows, 0, &mut sum);
-                    for (p, sum) in sum.iter().enumerate() {
-                        for (a, sum) in sum.iter().enumerate() {
-                            let at = (WIDTH * h + high + a) * side + WIDTH * (first + g + p);
-                            A::store(*sum, row_mut(update, at));
-                        }
-                    }
-                }
-            }
-        });
     }
 }

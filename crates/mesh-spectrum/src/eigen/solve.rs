@@ -1,8 +1,8 @@
 //! L D Lᵀ x = b for eight right-hand sides at once.
 //!
-//! The factor is stored in groups of eight rows of a supernode: one `Row` holds eight
-//! rows' entries of one column, so that every inner loop is "eight entries of L times a row of x" on whole cache
-//! lines, and the index of a row is read once for eight right-hand sides.
+//! The factor is stored in groups of eight rows of a supernode: one `Row` holds eight rows' entries of one column, so
+//! that every inner loop is "eight entries of L times a row of x" on whole cache lines, and the index of a row is read
+//! once for eight right-hand sides.
 
 use std::sync::Arc;
 
@@ -47,7 +47,7 @@ impl Supernode {
     /// Where group g of eight rows of the diagonal block starts in `values`: 8 (g + 1) columns, of which the last
     /// eight are triangular.
     #[inline(always)]
-    fn diagonal_start(&self, group: usize) -> usize {
+    pub(crate) fn diagonal_start(&self, group: usize) -> usize {
         self.diagonal + WIDTH * (group * (group + 1) / 2)
     }
 }
