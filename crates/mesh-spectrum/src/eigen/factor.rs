@@ -15,7 +15,7 @@ use crate::eigen::block::{Block, WIDTH};
 use crate::eigen::front::{Tree, Workspace};
 use crate::eigen::kernel::{self, Kind};
 use crate::eigen::seconds::Step;
-use crate::eigen::solve::{Layout, Packed, Supernode};
+use crate::eigen::solve::{Layout, Packed, Supernode, triangle_lines};
 use crate::eigen::{EigenError, Progress};
 use crate::operator::Csr;
 
@@ -127,16 +127,16 @@ fn layout(symbolic: &SymbolicSupernodalCholesky<usize>) -> Layout {
         let begin = symbolic.supernode_begin()[number];
         let width = symbolic.supernode_end()[number] - begin;
         let pattern = symbolic.supernode(number).pattern();
-        let (blocks, groups) = (width.div_ceil(WIDTH), pattern.len().div_ceil(WIDTH));
-        let stride = if width < 3 { width } else { width.next_multiple_of(4) };
-        let diagonal = len;
-        let below = if width == 1 { diagonal } else { diagonal + WIDTH * (blocks * (blocks - 1) / 2) + width };
-        len = below + groups * stride;
-        supernodes.push(Supernode { begin, width, stride, diagonal, below, rows: rows.len(), groups });
+        let groups = pattern.len().div_ceil(WIDTH);
+        let mut supernode = Supernode { begin, width, diagonal: len, below: len, rows: rows.len(), groups };
+        let last = (width - 1) / WIDTH;
+        supernode.below = supernode.diagonal_start(last) + WIDTH * last + triangle_lines(width - WIDTH * last);
+        len = supernode.below + groups * width;
+        supernodes.push(supernode);
         rows.extend(pattern.iter().map(|&row| row as u32));
         rows.resize(supernodes[number].rows + WIDTH * groups, n as u32);
     }
-    Layout { supernodes, rows, len }
+    Layout { supernodes, rows, len: len + WIDTH }
 }
 
 #[cfg(test)]

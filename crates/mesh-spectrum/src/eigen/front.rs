@@ -90,7 +90,7 @@ impl Supernode {
 
     /// Rows of 64 bytes that its columns are stored in.
     fn len(&self) -> usize {
-        self.below - self.diagonal + self.stride * self.groups
+        self.below - self.diagonal + self.width * self.groups
     }
 }
 

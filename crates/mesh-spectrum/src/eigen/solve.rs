@@ -14,12 +14,9 @@ use crate::eigen::kernel::{add_scaled, prefetch};
 pub(crate) struct Supernode {
     pub(crate) begin: usize,
     pub(crate) width: usize,
-    /// Columns a group of rows is stored with: `width`, rounded up to a multiple of 4 from 3 on.
-    pub(crate) stride: usize,
-    /// Where its diagonal block starts in `values`: group g of eight rows takes 8 (g + 1) columns, the last one no
-    /// more than there are. A single column has none.
+    /// Where its diagonal block starts in `values`: group g of eight rows takes 8 g columns and a triangle.
     pub(crate) diagonal: usize,
-    /// Where the rows below start in `values`: `stride` columns a group.
+    /// Where the rows below start in `values`: `width` columns a group.
     pub(crate) below: usize,
     /// Where its row numbers start in `rows`, and how many groups of eight there are.
     pub(crate) rows: usize,
@@ -31,7 +28,7 @@ pub(crate) struct Layout {
     pub(crate) supernodes: Vec<Supernode>,
     /// Row numbers in groups of eight; the last group of a supernode is filled up with n, a row of its own in x.
     pub(crate) rows: Vec<u32>,
-    /// Rows of 64 bytes.
+    /// Rows of 64 bytes, and some at the end that are only read along with others.
     pub(crate) len: usize,
 }
 
@@ -44,12 +41,22 @@ pub(crate) struct Packed {
 }
 
 impl Supernode {
-    /// Where group g of eight rows of the diagonal block starts in `values`: 8 (g + 1) columns, of which the last
-    /// eight are triangular.
+    /// Where group g of eight rows of the diagonal block starts in `values`.
     #[inline(always)]
     pub(crate) fn diagonal_start(&self, group: usize) -> usize {
-        self.diagonal + WIDTH * (group * (group + 1) / 2)
+        self.diagonal + WIDTH * (group * group.saturating_sub(1) / 2) + group * triangle_lines(WIDTH)
     }
+}
+
+/// Rows of 64 bytes that a strict lower triangle of so many rows is packed into, row after row.
+pub(crate) const fn triangle_lines(rows: usize) -> usize {
+    in_triangle(rows, 0).div_ceil(WIDTH)
+}
+
+/// Where row r's entry of column j < r is in a triangle.
+#[inline(always)]
+pub(crate) const fn in_triangle(r: usize, j: usize) -> usize {
+    r * r.saturating_sub(1) / 2 + j
 }
 
 /// X = (L D Lᵀ)⁻¹ X in place. `x` has n + 1 rows, the last of them scratch.
@@ -126,15 +133,16 @@ macro_rules! for_length {
 }
 pub(crate) use for_length;
 
-/// x ← T⁻¹ (x − known), T the unit lower triangle whose column j is `triangle[j]`.
+/// x ← T⁻¹ (x − known), T a packed unit lower triangle.
 #[inline(always)]
 fn below_diagonal<A: Arithmetic, const N: usize>(triangle: &[Row], known: &Small, own: &mut [Row]) {
+    let triangle = &triangle[..triangle_lines(N)].as_flattened();
     let mut x: [Row; N] = std::array::from_fn(|r| std::array::from_fn(|k| own[r][k] - known[r][k]));
     for j in 0..N {
         let solved = x[j];
         for r in 0..N {
             if r > j {
-                add_scaled::<A>(&mut x[r], -triangle[j][r], &solved);
+                add_scaled::<A>(&mut x[r], -triangle[in_triangle(r, j)], &solved);
             }
         }
     }
@@ -144,12 +152,13 @@ fn below_diagonal<A: Arithmetic, const N: usize>(triangle: &[Row], known: &Small
 /// x ← T⁻ᵀ (x − known).
 #[inline(always)]
 fn above_diagonal<A: Arithmetic, const N: usize>(triangle: &[Row], known: &Small, own: &mut [Row]) {
+    let triangle = &triangle[..triangle_lines(N)].as_flattened();
     let mut x: [Row; N] = std::array::from_fn(|r| std::array::from_fn(|k| own[r][k] - known[r][k]));
     for r in (0..N).rev() {
         let solved = x[r];
         for j in 0..N {
             if j < r {
-                add_scaled::<A>(&mut x[j], -triangle[j][r], &solved);
+                add_scaled::<A>(&mut x[j], -triangle[in_triangle(r, j)], &solved);
             }
         }
     }
@@ -165,7 +174,7 @@ fn forward<A: Arithmetic, const HIGH: usize>(factor: &Packed, s: &Supernode, x: 
         let start = s.diagonal_start(g);
         let known = group::<A, HIGH>(&factor.values, start, &own[..WIDTH * g]);
         let rows = (s.width - WIDTH * g).min(WIDTH);
-        let triangle = &factor.values[start + WIDTH * g..][..rows];
+        let triangle = &factor.values[start + WIDTH * g..];
         let own = &mut own[WIDTH * g..][..rows];
         for_length!(rows, below_diagonal::<A>(triangle, &known, own));
     }
@@ -173,7 +182,7 @@ fn forward<A: Arithmetic, const HIGH: usize>(factor: &Packed, s: &Supernode, x: 
     for g in 0..s.groups {
         let rows = &factor.layout.rows[s.rows + WIDTH * g..][..WIDTH];
         prefetch_forward(factor, s.rows + WIDTH * g, tail, first);
-        let known = group::<A, HIGH>(&factor.values, s.below + g * s.stride, own);
+        let known = group::<A, HIGH>(&factor.values, s.below + g * s.width, own);
         for r in 0..WIDTH {
             let row = &mut tail[rows[r] as usize - first];
             for k in 0..WIDTH {
@@ -199,7 +208,7 @@ fn backward<A: Arithmetic, const HIGH: usize>(factor: &Packed, s: &Supernode, x:
                 known[high..high + 4].copy_from_slice(&above::<A, 4>(factor, s, g, high, x, asked)[..4]);
             }
         }
-        let triangle = &factor.values[s.diagonal_start(g) + WIDTH * g..][..columns];
+        let triangle = &factor.values[s.diagonal_start(g) + WIDTH * g..];
         let own = &mut x[s.begin + WIDTH * g..][..columns];
         for_length!(columns, above_diagonal::<A>(triangle, &known, own));
     }
@@ -218,13 +227,13 @@ fn above<A: Arithmetic, const COLUMNS: usize>(
     let mut sum = [ZERO; COLUMNS];
     let column = WIDTH * group + high;
     for g in 0..s.groups {
-        let start = s.below + g * s.stride + column;
+        let start = s.below + g * s.width + column;
         let l = &factor.values[start..start + COLUMNS];
         let rows = &factor.layout.rows[s.rows + WIDTH * g..][..WIDTH];
         let later = &factor.layout.rows[s.rows + WIDTH * (g + 4).min(s.groups - 1)..][..WIDTH];
         for r in 0..WIDTH {
             if r < COLUMNS {
-                prefetch(&factor.values, start + 4 * s.stride + r);
+                prefetch(&factor.values, start + 4 * s.width + r);
             }
             prefetch(x, later[r] as usize);
             let x = &x[rows[r] as usize];
@@ -292,7 +301,7 @@ fn forward_narrow<A: Arithmetic, const W: usize>(factor: &Packed, s: &Supernode,
     let own: &mut [Row; W] = (&mut head[s.begin..]).try_into().unwrap_or_else(|_| unreachable!("W rows"));
     if W == 2 {
         let solved = own[0];
-        add_scaled::<A>(&mut own[1], -factor.values[s.diagonal][1], &solved);
+        add_scaled::<A>(&mut own[1], -factor.values[s.diagonal][0], &solved);
     }
     let minus = own.map(|row| row.map(|x| -x));
     for g in 0..s.groups {
@@ -334,7 +343,7 @@ fn backward_narrow<A: Arithmetic, const W: usize>(factor: &Packed, s: &Supernode
             own[k] = own[k] * inverse - ((sums[j][0][k] + sums[j][1][k]) + (sums[j][2][k] + sums[j][3][k]));
         }
         if W == 2 && j == 0 {
-            add_scaled::<A>(&mut own, -factor.values[s.diagonal][1], &x[s.begin + 1]);
+            add_scaled::<A>(&mut own, -factor.values[s.diagonal][0], &x[s.begin + 1]);
         }
         x[s.begin + j] = own;
     }

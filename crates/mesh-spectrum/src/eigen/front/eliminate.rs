@@ -6,7 +6,7 @@ use crate::eigen::arithmetic::Arithmetic;
 use crate::eigen::block::{Row, WIDTH, ZERO};
 use crate::eigen::factor::Pivots;
 use crate::eigen::products::{add_outer, in_groups};
-use crate::eigen::solve::{Supernode, for_length};
+use crate::eigen::solve::{Supernode, for_length, in_triangle, triangle_lines};
 
 /// Blocks of eight columns that what was eliminated before them is taken off together, and blocks of an update that are
 /// made together: the rows that all of them take stay in a core's cache meanwhile.
@@ -16,7 +16,7 @@ const TOGETHER: usize = 4;
 #[inline(always)]
 fn start(s: &Supernode, group: usize) -> usize {
     match group.checked_sub(s.width.div_ceil(WIDTH)) {
-        Some(group) => s.below - s.diagonal + group * s.stride,
+        Some(group) => s.below - s.diagonal + group * s.width,
         None => s.diagonal_start(group) - s.diagonal,
     }
 }
@@ -163,8 +163,11 @@ fn eliminate_block<A: Arithmetic, const C: usize, const P: usize>(
                 tile[a][k] = A::fma(-owed[a], eliminated[k], tile[a][k]);
             }
         }
-        if s.width > 1 {
-            columns[own + column + j] = eliminated;
+    }
+    let packed = columns[own + column..][..triangle_lines(C)].as_flattened_mut();
+    for r in 1..C {
+        for j in 0..r {
+            packed[in_triangle(r, j)] = -block.triangle[j][r];
         }
     }
 
