@@ -24,7 +24,7 @@ pub(crate) const SMALL_ZERO: Small = [[0.0; WIDTH]; WIDTH];
 #[derive(Debug)]
 pub(crate) struct Block {
     memory: Vec<f64>,
-    /// Entries before the first that starts a cache line.
+    /// Entries before the first row, which starts a cache line.
     offset: usize,
     rows: usize,
 }
@@ -32,7 +32,12 @@ pub(crate) struct Block {
 impl Block {
     /// So many rows of zeros.
     pub(crate) fn zeros(rows: usize) -> Block {
-        Block::aligned(rows, 64)
+        Block::aligned(0, rows, 64)
+    }
+
+    /// The same, behind so many other rows that are not its own.
+    pub(crate) fn behind(others: usize, rows: usize) -> Block {
+        Block::aligned(others, rows, 64)
     }
 
     /// The same, for memory that is gone through again and again: in large pages, if it is large.
@@ -41,16 +46,16 @@ impl Block {
         if page == 0 {
             return Block::zeros(rows);
         }
-        let block = Block::aligned(rows, page);
+        let block = Block::aligned(0, rows, page);
         pages::advise(&block.memory[..block.offset + WIDTH * rows], block.offset);
         block
     }
 
-    fn aligned(rows: usize, bytes: usize) -> Block {
+    fn aligned(others: usize, rows: usize, bytes: usize) -> Block {
         let most = bytes / size_of::<f64>() - 1;
-        let memory = vec![0.0; rows * WIDTH + most];
+        let memory = vec![0.0; (others + rows) * WIDTH + most];
         // Where the allocator gives no way to align, the block works all the same, a little slower.
-        let offset = memory.as_ptr().align_offset(bytes).min(most);
+        let offset = memory.as_ptr().align_offset(bytes).min(most) + others * WIDTH;
         Block { memory, offset, rows }
     }
 

@@ -15,6 +15,7 @@ use crate::eigen::dense;
 use crate::eigen::factor::{Factor, Symbolic};
 use crate::eigen::kernel::Kind;
 use crate::eigen::order::{elimination_order, permuted};
+use crate::eigen::output;
 use crate::eigen::polish::Levels;
 use crate::eigen::slice::{Tools, Trouble, norm};
 use crate::eigen::weyl::Weyl;
@@ -156,7 +157,7 @@ impl Component {
             wanted: n,
             detail: "the dense solver did not converge".into(),
         })?;
-        let mut vectors = Block::zeros(n * n.div_ceil(WIDTH));
+        let mut vectors = output::blocks(n, n.div_ceil(WIDTH));
         for (b, block) in vectors.chunks_exact_mut(n).enumerate() {
             for c in 0..WIDTH.min(n - WIDTH * b) {
                 block.iter_mut().enumerate().for_each(|(i, row)| row[c] = u[(i, WIDTH * b + c)]);
@@ -184,7 +185,7 @@ impl Component {
     ) -> Result<Pairs, EigenError> {
         if count == 1 {
             progress.add(1);
-            let (vectors, counts) = (Block::zeros(self.rows()), vec![(top, 1, 1)]);
+            let (vectors, counts) = (output::blocks(self.rows(), 1), vec![(top, 1, 1)]);
             return Ok(Pairs {
                 eigenvalues: vec![0.0],
                 vectors,
@@ -239,7 +240,7 @@ impl Component {
 
         let n = self.rows();
         let blocks_of = |span: &Span| (span.end - span.first).div_ceil(WIDTH);
-        let mut vectors = Block::zeros(n * spans.iter().map(blocks_of).sum::<usize>());
+        let mut vectors = output::blocks(n, spans.iter().map(blocks_of).sum());
         let mut blocks: Vec<&mut [Row]> = vectors.chunks_exact_mut(n).collect();
         let (mut shares, mut starts) = (Vec::new(), Vec::new());
         let (mut rest, mut start) = (&mut blocks[..], 0);

@@ -1,7 +1,8 @@
 //! Eigenvectors on vertices, one after another, from blocks in elimination order.
 //!
 //! They are as large as everything else together, so where there is one component the blocks are turned into rows in
-//! the memory they are in: a row ends no later than the block that its values come from.
+//! the memory they are in. It has room for some blocks in front of the first one, so that the rows of as many blocks end
+//! before the first of these starts.
 
 use rayon::prelude::*;
 
@@ -11,7 +12,7 @@ use crate::eigen::finish::Evidence;
 use crate::eigen::kernel::prefetch;
 use crate::operator::Operator;
 
-/// Blocks that are read together before any of their rows is written.
+/// Blocks that are turned into rows together.
 const TOGETHER: usize = 4;
 
 /// How many vertices ahead of its use a row is asked for.
@@ -19,6 +20,11 @@ const AHEAD: usize = 16;
 
 /// A vertex, its row in the component, and 1 / √mass.
 type Place = (u32, u32, f64);
+
+/// Blocks of `n` rows that [`eigenvectors`] can turn into its result where they are.
+pub(crate) fn blocks(n: usize, count: usize) -> Block {
+    Block::behind(n * TOGETHER, n * count)
+}
 
 /// K × N, row-major, φ = M^-½ v with its sign fixed, in the given order of (component, number of the pair).
 pub(crate) fn eigenvectors(
@@ -59,19 +65,18 @@ pub(crate) fn eigenvectors(
     result
 }
 
-/// Turns the blocks of one component into rows, in the same memory.
+/// Turns the blocks of one component, made by [`blocks`], into rows, in the same memory.
 fn in_place(vectors: Block, places: &[usize], scales: &[f64], vertices: &[Place]) -> Vec<f64> {
     let n = vertices.len();
     let (mut memory, offset) = vectors.into_memory();
-    let mut scratch: Vec<Block> = (0..TOGETHER).map(|_| Block::zeros(n)).collect();
     let mut done = 0;
     while let Some(&place) = places.get(done) {
         let first = place / WIDTH;
         let end = done + places[done..].iter().take_while(|&&place| place / WIDTH < first + TOGETHER).count();
-        let blocks = memory[offset..].as_chunks().0.chunks(n).skip(first);
-        scratch.par_iter_mut().zip(blocks.collect::<Vec<_>>()).for_each(|(to, from)| to.copy_from_slice(from));
-        let blocks: Vec<&[Row]> = scratch.iter().map(|block| &block[..]).collect();
-        let rows = memory[done * n..end * n].chunks_exact_mut(n).collect();
+        // Rows end at end · n at most, 8 (first + TOGETHER) n.
+        let (rows, blocks) = memory.split_at_mut(offset + WIDTH * first * n);
+        let blocks: Vec<&[Row]> = blocks.as_chunks().0.chunks(n).take(TOGETHER).collect();
+        let rows = rows[done * n..end * n].chunks_exact_mut(n).collect();
         write(&blocks, first, &places[done..end], &scales[done..end], vertices, rows);
         done = end;
     }
