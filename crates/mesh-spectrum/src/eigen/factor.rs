@@ -13,7 +13,7 @@ use faer::sparse::linalg::cholesky::{self, SymbolicCholeskyRaw, supernodal::Symb
 
 use crate::eigen::block::{Block, WIDTH};
 use crate::eigen::front::{Tree, Workspace};
-use crate::eigen::kernel::{self, Kind};
+use crate::eigen::kernel::Kind;
 use crate::eigen::seconds::Step;
 use crate::eigen::solve::{Layout, Packed, Supernode, triangle_lines};
 use crate::eigen::{EigenError, Progress};
@@ -52,6 +52,24 @@ pub(crate) struct Pivots {
     pub(crate) growth: f64,
 }
 
+impl Default for Pivots {
+    /// Of nothing.
+    fn default() -> Pivots {
+        Pivots { negative: 0, least: f64::INFINITY, growth: 0.0 }
+    }
+}
+
+impl Pivots {
+    /// Of two parts of a factor.
+    pub(crate) fn and(self, other: Pivots) -> Pivots {
+        Pivots {
+            negative: self.negative + other.negative,
+            least: if self.least.is_nan() || other.least.is_nan() { f64::NAN } else { self.least.min(other.least) },
+            growth: self.growth.max(other.growth),
+        }
+    }
+}
+
 impl Symbolic {
     /// # Errors
     /// [`EigenError::OutOfMemory`] if the pattern of L cannot be held.
@@ -80,6 +98,11 @@ impl Symbolic {
         Ok(Symbolic { tree, layout: Arc::new(layout), kind, workspaces, packed })
     }
 
+    #[cfg(test)]
+    pub(crate) fn tree(&self) -> &Tree {
+        &self.tree
+    }
+
     /// Takes back the memory of a factor that is no longer needed.
     pub(crate) fn recycle(&self, factor: Factor) {
         lock(&self.packed).push(factor.packed);
@@ -105,8 +128,7 @@ impl Symbolic {
                 inverse: vec![0.0; self.tree.columns()],
             });
             let mut workspace = lock(&self.workspaces).pop().unwrap_or_else(|| self.tree.workspace());
-            let mut pivots = Pivots { negative: 0, least: f64::INFINITY, growth: 0.0 };
-            kernel::factor(self.kind, &self.tree, matrix, shift, &mut workspace, &mut packed, &mut pivots);
+            let pivots = self.tree.factor(self.kind, matrix, shift, &mut workspace, &mut packed);
             lock(&self.workspaces).push(workspace);
             let Pivots { negative: below, least: pivot_min, growth } = pivots;
             (growth.is_finite() && pivot_min > 0.0).then_some(Factor { shift, below, growth, pivot_min, packed })
@@ -140,13 +162,14 @@ fn layout(symbolic: &SymbolicSupernodalCholesky<usize>) -> Layout {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::eigen::block::{Row, ZERO};
+    use crate::eigen::kernel;
     use crate::eigen::order::{elimination_order, permuted};
 
     /// 2 + a diagonal, −1 to the four neighbours on a grid.
-    fn grid(side: usize) -> Csr {
+    pub(crate) fn grid(side: usize) -> Csr {
         let mut entries = Vec::new();
         for i in 0..side * side {
             entries.push((i as u32, i as u32, 4.0 + i as f64 / 7.0));

@@ -9,6 +9,9 @@
 //! is filled with zeros or copied but the panel. As children come before parents, updates live on a stack, or rather on
 //! two, one for every other level of the tree, so that an update can be written while the children's are still there.
 //!
+//! Two parts of the tree that owe each other nothing are factored at the same time, if there is a thread for it, and then
+//! the rest, which is what both leave their updates to.
+//!
 //! Panels and updates are column-major, of updates only the lower triangle is used. The columns take the first places of
 //! a panel, filled up to a multiple of eight, so that the rows below start at a cache line and products run over whole
 //! tiles of 8 × 8. Eliminated columns go straight to where the solve wants them, eight rows of a column together, which
@@ -21,6 +24,7 @@ use std::ops::Range;
 use crate::eigen::arithmetic::Arithmetic;
 use crate::eigen::block::{Row, WIDTH, ZERO};
 use crate::eigen::factor::Pivots;
+use crate::eigen::kernel::{self, Kind};
 use crate::eigen::solve::{Layout, Packed, Supernode};
 use crate::operator::Csr;
 
@@ -45,8 +49,12 @@ pub(crate) struct Tree {
     fronts: Vec<Front>,
     /// Children of all supernodes, one's after another's.
     children: Vec<u32>,
-    panel_max: usize,
-    columns_max: usize,
+    /// Supernodes below the first number and from there to the second owe each other nothing.
+    ends: [usize; 2],
+    /// What the second of these needs, and what all the others.
+    bench_max: [BenchSize; 2],
+    /// Where the second of these starts on the stacks, and how large they are.
+    stack_from: [usize; 2],
     stack_max: [usize; 2],
 }
 
@@ -64,12 +72,35 @@ struct Front {
 }
 
 /// What a factorisation needs beside its result.
-#[derive(Default)]
 pub(crate) struct Workspace {
-    panel: Vec<f64>,
+    /// As in [`Tree::bench_max`].
+    benches: [Bench; 2],
     stacks: [Vec<f64>; 2],
+}
+
+/// Where one thread eliminates.
+struct Bench {
+    panel: Vec<f64>,
     /// −D times the columns of a supernode, as they are stored there.
     minus: Vec<Row>,
+}
+
+#[derive(Debug, Clone, Copy, Default)]
+struct BenchSize {
+    panel: usize,
+    columns: usize,
+}
+
+/// Supernodes next to each other, and what factoring them writes to.
+pub(crate) struct Share<'a> {
+    supernodes: Range<usize>,
+    /// Their columns of L, and D⁻¹.
+    columns: &'a mut [Row],
+    inverse: &'a mut [f64],
+    /// The stacks from certain places on.
+    stacks: [&'a mut [f64]; 2],
+    stack_from: [usize; 2],
+    bench: &'a mut Bench,
 }
 
 impl Supernode {
@@ -120,8 +151,9 @@ impl Tree {
             groups_in_parent: vec![NOWHERE; layout.rows.len() / WIDTH],
             fronts,
             children: of_parent.concat(),
-            panel_max: 0,
-            columns_max: 0,
+            ends: ends(supernodes, &of_parent),
+            bench_max: [BenchSize::default(); 2],
+            stack_from: [0; 2],
             stack_max: [0; 2],
         };
         let mut place = vec![0u32; n];
@@ -164,6 +196,10 @@ impl Tree {
                     }
                 }
             }
+            if number == tree.ends[0] {
+                taken = tree.stack_max;
+                tree.stack_from = taken;
+            }
             // The children's updates are the last ones on the other stack.
             let Front { stack, .. } = tree.fronts[number];
             if let Some(&first) = children.first() {
@@ -173,8 +209,9 @@ impl Tree {
             children_before += children.len();
             taken[stack] += below * below;
             tree.stack_max[stack] = tree.stack_max[stack].max(taken[stack]);
-            tree.panel_max = tree.panel_max.max(side * s.width);
-            tree.columns_max = tree.columns_max.max(s.len());
+            let bench = &mut tree.bench_max[usize::from((tree.ends[0]..tree.ends[1]).contains(&number))];
+            bench.panel = bench.panel.max(side * s.width);
+            bench.columns = bench.columns.max(s.len());
         }
         Some(tree)
     }
@@ -192,12 +229,64 @@ impl Tree {
 
     /// Bytes of a workspace.
     pub(crate) fn workspace_bytes(&self) -> usize {
-        8 * (self.panel_max + WIDTH * self.columns_max + self.stack_max.iter().sum::<usize>())
+        let benches = self.bench_max.iter().map(|most| most.panel + WIDTH * most.columns).sum::<usize>();
+        8 * (benches + self.stack_max.iter().sum::<usize>())
     }
 
     pub(crate) fn workspace(&self) -> Workspace {
-        let stacks = self.stack_max.map(|most| vec![0.0; most]);
-        Workspace { panel: vec![0.0; self.panel_max], stacks, minus: vec![ZERO; self.columns_max] }
+        let bench = |most: BenchSize| Bench { panel: vec![0.0; most.panel], minus: vec![ZERO; most.columns] };
+        Workspace { benches: self.bench_max.map(bench), stacks: self.stack_max.map(|most| vec![0.0; most]) }
+    }
+
+    /// L D Lᵀ = A − σI into `packed`.
+    pub(crate) fn factor(
+        &self,
+        kind: Kind,
+        matrix: &Csr,
+        shift: f64,
+        workspace: &mut Workspace,
+        packed: &mut Packed,
+    ) -> Pivots {
+        let layout = &*packed.layout;
+        let Workspace { benches: [bench, other], stacks: [even, odd] } = workspace;
+        let [middle, end] = self.ends;
+        let line = |number: usize| layout.supernodes.get(number).map_or(packed.values.len(), |s| s.diagonal);
+        let row = |number: usize| layout.supernodes.get(number).map_or(self.columns(), |s| s.begin);
+        let (lines, rows) = ([line(middle), line(end)], [row(middle), row(end)]);
+        let (both, columns) = packed.values.split_at_mut(lines[1]);
+        let [first_columns, second_columns] = <[_; 2]>::from(both.split_at_mut(lines[0]));
+        let (both, inverse) = packed.inverse.split_at_mut(rows[1]);
+        let [first_inverse, second_inverse] = <[_; 2]>::from(both.split_at_mut(rows[0]));
+        let mut pivots = [Pivots::default(); 3];
+        let [first, second, rest] = &mut pivots;
+        if end > 0 {
+            let [(even, even_after), (odd, odd_after)] =
+                [even.split_at_mut(self.stack_from[0]), odd.split_at_mut(self.stack_from[1])];
+            let before = Share {
+                supernodes: 0..middle,
+                columns: first_columns,
+                inverse: first_inverse,
+                stacks: [even, odd],
+                stack_from: [0; 2],
+                bench: &mut *bench,
+            };
+            let after = Share {
+                supernodes: middle..end,
+                columns: second_columns,
+                inverse: second_inverse,
+                stacks: [even_after, odd_after],
+                stack_from: self.stack_from,
+                bench: other,
+            };
+            rayon::join(
+                || kernel::factor(kind, self, layout, matrix, shift, before, first),
+                || kernel::factor(kind, self, layout, matrix, shift, after, second),
+            );
+        }
+        let supernodes = end..layout.supernodes.len();
+        let share = Share { supernodes, columns, inverse, stacks: [even, odd], stack_from: [0; 2], bench };
+        kernel::factor(kind, self, layout, matrix, shift, share, rest);
+        pivots.into_iter().fold(Pivots::default(), Pivots::and)
     }
 
     fn children(&self, number: usize) -> &[u32] {
@@ -206,22 +295,46 @@ impl Tree {
     }
 }
 
-/// L D Lᵀ = A − σI into `packed`.
+/// Multiplications that must be saved for two threads to factor two parts of a tree: what waking a thread takes.
+const WORTH: usize = 2_000_000;
+
+/// Where two parts end that owe each other nothing, one from the first supernode on and one from there: a subtree, such
+/// that the smaller of both is as much work as can be. Nowhere, if that is not worth it.
+fn ends(supernodes: &[Supernode], children: &[Vec<u32>]) -> [usize; 2] {
+    let (mut work, mut first) = (vec![0], Vec::new()); // before each supernode; the first one of each subtree
+    let (mut most, mut ends) = (WORTH, [0; 2]);
+    for (number, (s, children)) in supernodes.iter().zip(children).enumerate() {
+        work.push(work[number] + s.width * s.side() * s.side());
+        first.push(children.first().map_or(number, |&child| first[child as usize]));
+        let saved = work[first[number]].min(work[number + 1] - work[first[number]]);
+        if saved > most {
+            (most, ends) = (saved, [first[number], number + 1]);
+        }
+    }
+    ends
+}
+
+/// L D Lᵀ = A − σI for some supernodes, once what they depend on is there.
 #[inline(always)]
 pub(crate) fn factor_with<A: Arithmetic, const R: usize, const HIGH: usize, const P: usize>(
     tree: &Tree,
+    layout: &Layout,
     matrix: &Csr,
     shift: f64,
-    workspace: &mut Workspace,
-    packed: &mut Packed,
+    share: Share,
     pivots: &mut Pivots,
 ) {
-    let layout = packed.layout.clone();
-    let Workspace { panel, stacks: [even, odd], minus } = workspace;
-    for (number, s) in layout.supernodes.iter().enumerate() {
+    let Share { supernodes, columns, inverse, stacks: [even, odd], stack_from, bench: Bench { panel, minus } } = share;
+    let Some(&Supernode { begin: first_row, diagonal: first_line, .. }) = layout.supernodes.get(supernodes.start)
+    else {
+        return;
+    };
+    for number in supernodes {
+        let s = &layout.supernodes[number];
         let (side, below) = (s.side(), s.update_side());
         let Front { stack, at, .. } = tree.fronts[number];
         let (own, others) = if stack == 0 { (&mut *even, &*odd) } else { (&mut *odd, &*even) };
+        let (at, others_from) = (at - stack_from[stack], stack_from[1 - stack]);
         let panel = &mut panel[..side * s.width];
         panel.fill(0.0);
         for row in s.begin..s.begin + s.width {
@@ -232,16 +345,16 @@ pub(crate) fn factor_with<A: Arithmetic, const R: usize, const HIGH: usize, cons
             panel[(row - s.begin) * (side + 1)] -= shift;
         }
         for &child in tree.children(number) {
-            let child = Update::new(tree, &layout, child as usize, others);
+            let child = Update::new(tree, layout, child as usize, others, others_from);
             child.add(0..child.shared, panel, side, 0);
         }
-        let columns = &mut packed.values[s.diagonal..s.diagonal + s.len()];
-        eliminate::<A, HIGH, P>(s, panel, columns, minus, &mut packed.inverse[s.begin..], pivots);
+        let columns = &mut columns[s.diagonal - first_line..][..s.len()];
+        eliminate::<A, HIGH, P>(s, panel, columns, minus, &mut inverse[s.begin - first_row..], pivots);
         if below > 0 {
             let update = &mut own[at..at + below * below];
             make_update::<A, HIGH, P>(s, columns, minus, update);
             for &child in tree.children(number) {
-                let child = Update::new(tree, &layout, child as usize, others);
+                let child = Update::new(tree, layout, child as usize, others, others_from);
                 child.add(child.shared..child.rows, update, below, s.head());
             }
         }
@@ -262,11 +375,11 @@ struct Update<'a> {
 
 impl<'a> Update<'a> {
     #[inline(always)]
-    fn new(tree: &'a Tree, layout: &Layout, number: usize, stack: &'a [f64]) -> Update<'a> {
+    fn new(tree: &'a Tree, layout: &Layout, number: usize, stack: &'a [f64], from: usize) -> Update<'a> {
         let (s, Front { at, shared, rows, .. }) = (&layout.supernodes[number], tree.fronts[number]);
         let places = &tree.in_parent[s.rows..][..s.update_side()];
         let groups = &tree.groups_in_parent[s.rows / WIDTH..][..s.groups];
-        Update { values: &stack[at..], places, groups, shared, rows }
+        Update { values: &stack[at - from..], places, groups, shared, rows }
     }
 
     /// Adds some of its columns to those of its parent, which have `side` rows from place `first` on.
@@ -296,6 +409,39 @@ impl<'a> Update<'a> {
                     }
                 }
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::eigen::Progress;
+    use crate::eigen::factor::Symbolic;
+    use crate::eigen::factor::tests::grid;
+    use crate::eigen::order::{elimination_order, permuted};
+
+    #[test]
+    fn parts_of_a_tree_that_are_factored_at_the_same_time_give_the_same_bytes() {
+        let matrix = grid(150);
+        let matrix = permuted(&matrix, &elimination_order(&matrix).unwrap());
+        let n = matrix.rows();
+        let symbolic = Symbolic::new(&matrix, Kind::best()).unwrap();
+        let [middle, end] = symbolic.tree().ends;
+        assert!(0 < middle && middle < end, "a grid falls into two");
+        let factor = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| symbolic.factor(&matrix, 0.01, &Progress::new(&(), 0)).unwrap())
+        };
+        let (one, two) = (factor(1), factor(2));
+        assert_eq!(one.packed.inverse, two.packed.inverse);
+        assert_eq!(one.packed.values[..], two.packed.values[..]);
+        assert_eq!((one.below, one.growth, one.pivot_min), (two.below, two.growth, two.pivot_min));
+        let mut x = vec![[1.0; WIDTH]; n + 1];
+        kernel::solve(Kind::best(), &two.packed, &mut x);
+        for i in 0..n {
+            let product: f64 = matrix.row(i).map(|(j, a)| a * x[j][3]).sum();
+            assert!((product - 0.01 * x[i][3] - 1.0).abs() < 1e-12 * two.growth.max(1.0) * 1e3, "row {i}");
         }
     }
 }

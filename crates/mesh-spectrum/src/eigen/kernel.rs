@@ -12,11 +12,11 @@ use crate::eigen::arithmetic::Plain;
 use crate::eigen::arithmetic::{Avx2, Avx512};
 use crate::eigen::block::{Row, Small, WIDTH, ZERO};
 use crate::eigen::factor::Pivots;
-use crate::eigen::front::{Tree, Workspace, factor_with};
+use crate::eigen::front::{Share, Tree, factor_with};
 use crate::eigen::polish::{Levels, chebyshev_with};
 use crate::eigen::products::{gram_with, recur_with, scale_with, update_with};
 use crate::eigen::single::{SingleRow, SingleSmall, correct_with};
-use crate::eigen::solve::{Packed, solve_with};
+use crate::eigen::solve::{Layout, Packed, solve_with};
 use crate::eigen::tridiagonal::{Reflected, Rotations, reflect_with, turn_with};
 use crate::operator::Csr;
 
@@ -184,9 +184,9 @@ dispatched! {
     );
     /// `squares[k]` = ‖A x_k − λ_k x_k‖² for the eight columns of X.
     residual = residual_with(matrix: &Csr, x: &[Row], eigenvalues: &Row, squares: &mut Row);
-    /// L D Lᵀ = A − σI.
+    /// L D Lᵀ = A − σI, some supernodes of it.
     factor = factor_with(
-        tree: &Tree, matrix: &Csr, shift: f64, workspace: &mut Workspace, packed: &mut Packed, pivots: &mut Pivots
+        tree: &Tree, layout: &Layout, matrix: &Csr, shift: f64, share: Share, pivots: &mut Pivots
     );
     /// Reduces a symmetric matrix to tridiagonal form.
     reflect = reflect_with(of: &mut Reflected);
