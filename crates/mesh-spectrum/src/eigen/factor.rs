@@ -14,6 +14,7 @@ use faer::sparse::linalg::cholesky::{self, SymbolicCholeskyRaw, supernodal::Symb
 use crate::eigen::block::{Block, WIDTH};
 use crate::eigen::front::{Tree, Workspace};
 use crate::eigen::kernel::Kind;
+use crate::eigen::order::starts;
 use crate::eigen::seconds::Step;
 use crate::eigen::solve::{Layout, Packed, Supernode, triangle_lines};
 use crate::eigen::{EigenError, Progress};
@@ -75,13 +76,13 @@ impl Symbolic {
     /// [`EigenError::OutOfMemory`] if the pattern of L cannot be held.
     pub(crate) fn new(matrix: &Csr, kind: Kind) -> Result<Symbolic, EigenError> {
         let n = matrix.rows();
-        let columns: Vec<usize> = matrix.columns.iter().map(|&column| column as usize).collect();
-        let pattern = SymbolicSparseColMatRef::new_checked(n, n, &matrix.start, None, &columns);
+        let out_of_memory = || EigenError::OutOfMemory { dofs: n };
+        let start = starts(matrix).ok_or_else(out_of_memory)?;
+        let pattern = SymbolicSparseColMatRef::new_checked(n, n, &start, None, &matrix.columns);
         let parameters = cholesky::CholeskySymbolicParams {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
             ..Default::default()
         };
-        let out_of_memory = || EigenError::OutOfMemory { dofs: n };
         let cholesky = cholesky::factorize_symbolic_cholesky(
             pattern,
             Side::Upper,
@@ -141,13 +142,13 @@ fn lock<T>(list: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 /// Where the entries of the supernodes go.
-fn layout(symbolic: &SymbolicSupernodalCholesky<usize>) -> Layout {
+fn layout(symbolic: &SymbolicSupernodalCholesky<u32>) -> Layout {
     let n = symbolic.nrows();
     let mut supernodes = Vec::with_capacity(symbolic.n_supernodes());
     let (mut len, mut rows) = (0, Vec::new());
     for number in 0..symbolic.n_supernodes() {
-        let begin = symbolic.supernode_begin()[number];
-        let width = symbolic.supernode_end()[number] - begin;
+        let begin = symbolic.supernode_begin()[number] as usize;
+        let width = symbolic.supernode_end()[number] as usize - begin;
         let pattern = symbolic.supernode(number).pattern();
         let groups = pattern.len().div_ceil(WIDTH);
         let mut supernode = Supernode { begin, width, diagonal: len, below: len, rows: rows.len(), groups };
@@ -155,7 +156,7 @@ fn layout(symbolic: &SymbolicSupernodalCholesky<usize>) -> Layout {
         supernode.below = supernode.diagonal_start(last) + WIDTH * last + triangle_lines(width - WIDTH * last);
         len = supernode.below + groups * width;
         supernodes.push(supernode);
-        rows.extend(pattern.iter().map(|&row| row as u32));
+        rows.extend(pattern);
         rows.resize(supernodes[number].rows + WIDTH * groups, n as u32);
     }
     Layout { supernodes, rows, len: len + WIDTH }

@@ -11,48 +11,51 @@ use crate::operator::Csr;
 /// columns of one supernode are neighbours. Result: position → row.
 pub(crate) fn elimination_order(matrix: &Csr) -> Result<Vec<u32>, EigenError> {
     let n = matrix.rows();
-    let columns: Vec<usize> = matrix.columns.iter().map(|&column| column as usize).collect();
-    let pattern = SymbolicSparseColMatRef::new_checked(n, n, &matrix.start, None, &columns);
-    let (mut order, mut inverse) = (vec![0; n], vec![0; n]);
     let out_of_memory = || EigenError::OutOfMemory { dofs: n };
-    let mut scratch = MemBuffer::try_new(amd::order_scratch::<usize>(n, columns.len())).map_err(|_| out_of_memory())?;
-    amd::order(&mut order, &mut inverse, pattern, amd::Control::default(), MemStack::new(&mut scratch))
+    let start = starts(matrix).ok_or_else(out_of_memory)?;
+    let pattern = SymbolicSparseColMatRef::new_checked(n, n, &start, None, &matrix.columns);
+    let (mut order, mut position) = (vec![0; n], vec![0; n]);
+    let needed = amd::order_scratch::<u32>(n, matrix.columns.len());
+    let mut scratch = MemBuffer::try_new(needed).map_err(|_| out_of_memory())?;
+    amd::order(&mut order, &mut position, pattern, amd::Control::default(), MemStack::new(&mut scratch))
         .map_err(|_| out_of_memory())?;
-    let order: Vec<u32> = order.iter().map(|&row| row as u32).collect();
-    let parents = elimination_tree(&permuted(matrix, &order));
+    let parents = elimination_tree(matrix, &order, &position);
     Ok(postorder(&parents).iter().map(|&position| order[position as usize]).collect())
 }
 
-/// B[i, j] = A[order[i], order[j]].
+/// Where rows start, in the numbers that columns have; `None` if there are too many entries.
+pub(crate) fn starts(matrix: &Csr) -> Option<Vec<u32>> {
+    matrix.start.iter().map(|&start| start.try_into().ok()).collect()
+}
+
+/// B[i, j] = A[order[i], order[j]] of a symmetric A.
 pub(crate) fn permuted(matrix: &Csr, order: &[u32]) -> Csr {
-    let mut position = vec![0; order.len()];
+    let (mut position, mut start) = (vec![0; order.len()], vec![0]);
     for (new, &old) in order.iter().enumerate() {
-        position[old as usize] = new as u32;
+        position[old as usize] = new;
+        start.push(start[new] + matrix.start[old as usize + 1] - matrix.start[old as usize]);
     }
-    let mut result = Csr {
-        start: vec![0],
-        columns: Vec::with_capacity(matrix.columns.len()),
-        values: Vec::with_capacity(matrix.values.len()),
-    };
-    for &old in order {
-        let mut row: Vec<(u32, f64)> =
-            matrix.row(old as usize).map(|(column, value)| (position[column], value)).collect();
-        row.sort_unstable_by_key(|entry| entry.0);
-        result.columns.extend(row.iter().map(|entry| entry.0));
-        result.values.extend(row.iter().map(|entry| entry.1));
-        result.start.push(result.columns.len());
+    let (mut columns, mut values) = (vec![0; matrix.columns.len()], vec![0.0; matrix.columns.len()]);
+    let mut next = start.clone();
+    // A's rows are its columns. Taken in order, they leave the rows of the result sorted.
+    for (new, &old) in order.iter().enumerate() {
+        for (row, value) in matrix.row(old as usize) {
+            let at = &mut next[position[row]];
+            (columns[*at], values[*at]) = (new as u32, value);
+            *at += 1;
+        }
     }
-    result
+    Csr { start, columns, values }
 }
 
 const NONE: u32 = u32::MAX;
 
-/// Parent of every column in the elimination tree (Liu 1986, with path compression).
-fn elimination_tree(matrix: &Csr) -> Vec<u32> {
-    let n = matrix.rows();
-    let (mut parent, mut ancestor) = (vec![NONE; n], vec![NONE; n]);
-    for k in 0..n {
-        for (mut i, _) in matrix.row(k).take_while(|&(column, _)| column < k) {
+/// Parent of every column in the elimination tree, columns numbered by position (Liu 1986, with path compression).
+fn elimination_tree(matrix: &Csr, order: &[u32], position: &[u32]) -> Vec<u32> {
+    let (mut parent, mut ancestor) = (vec![NONE; order.len()], vec![NONE; order.len()]);
+    for (k, &row) in order.iter().enumerate() {
+        for (column, _) in matrix.row(row as usize) {
+            let mut i = position[column] as usize;
             while i < k {
                 let next = std::mem::replace(&mut ancestor[i], k as u32);
                 if next == NONE {
@@ -69,28 +72,35 @@ fn elimination_tree(matrix: &Csr) -> Vec<u32> {
 /// Children before parents, the largest subtree last, next to its parent.
 fn postorder(parent: &[u32]) -> Vec<u32> {
     let n = parent.len();
-    let mut size = vec![1u32; n];
-    let mut children = vec![Vec::new(); n];
-    let mut stack = Vec::new();
+    let root = |i: usize| if parent[i] == NONE { n } else { parent[i] as usize };
+    let (mut size, mut start) = (vec![1u32; n], vec![0; n + 2]);
     for i in 0..n {
-        match parent[i] {
-            NONE => stack.push((i as u32, false)),
-            p => {
-                size[p as usize] += size[i]; // parents come after their children
-                children[p as usize].push(i as u32);
-            }
+        start[root(i) + 1] += 1;
+        if parent[i] != NONE {
+            size[parent[i] as usize] += size[i]; // parents come after their children
         }
     }
-    let mut order = Vec::with_capacity(n);
-    while let Some((node, visited)) = stack.pop() {
-        if visited {
-            order.push(node);
-            continue;
+    (0..=n).for_each(|i| start[i + 1] += start[i]);
+    let (mut children, mut next) = (vec![0u32; n], start.clone());
+    for i in 0..n {
+        children[next[root(i)]] = i as u32;
+        next[root(i)] += 1;
+    }
+    // A subtree ends at its root, and its children's end before that, one before the other.
+    let (mut order, mut end) = (vec![0; n], vec![n; n + 1]);
+    for i in (0..=n).rev() {
+        if i < n {
+            end[i] -= 1;
+            order[end[i]] = i as u32;
         }
-        stack.push((node, true));
-        let mut below = std::mem::take(&mut children[node as usize]);
-        below.sort_by_key(|&child| std::cmp::Reverse(size[child as usize]));
-        stack.extend(below.into_iter().map(|child| (child, false)));
+        let (mut at, below) = (end[i], &mut children[start[i]..start[i + 1]]);
+        if i < n {
+            below.sort_by_key(|&child| std::cmp::Reverse(size[child as usize]));
+        }
+        for &child in &*below {
+            end[child as usize] = at;
+            at -= size[child as usize] as usize;
+        }
     }
     order
 }
