@@ -296,15 +296,15 @@ impl Tree {
 }
 
 /// Multiplications that must be saved for two threads to factor two parts of a tree: what waking a thread takes.
-const WORTH: usize = 2_000_000;
+const WORTH: f64 = 2e6;
 
 /// Where two parts end that owe each other nothing, one from the first supernode on and one from there: a subtree, such
 /// that the smaller of both is as much work as can be. Nowhere, if that is not worth it.
 fn ends(supernodes: &[Supernode], children: &[Vec<u32>]) -> [usize; 2] {
-    let (mut work, mut first) = (vec![0], Vec::new()); // before each supernode; the first one of each subtree
+    let (mut work, mut first) = (vec![0.0f64], Vec::new()); // before each supernode; the first one of each subtree
     let (mut most, mut ends) = (WORTH, [0; 2]);
     for (number, (s, children)) in supernodes.iter().zip(children).enumerate() {
-        work.push(work[number] + s.width * s.side() * s.side());
+        work.push(work[number] + s.width as f64 * (s.side() as f64).powi(2));
         first.push(children.first().map_or(number, |&child| first[child as usize]));
         let saved = work[first[number]].min(work[number + 1] - work[first[number]]);
         if saved > most {

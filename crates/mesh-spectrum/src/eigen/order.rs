@@ -72,10 +72,10 @@ fn elimination_tree(matrix: &Csr, order: &[u32], position: &[u32]) -> Vec<u32> {
 /// Children before parents, the largest subtree last, next to its parent.
 fn postorder(parent: &[u32]) -> Vec<u32> {
     let n = parent.len();
-    let root = |i: usize| if parent[i] == NONE { n } else { parent[i] as usize };
+    let above = |i: usize| if parent[i] == NONE { n } else { parent[i] as usize };
     let (mut size, mut start) = (vec![1u32; n], vec![0; n + 2]);
     for i in 0..n {
-        start[root(i) + 1] += 1;
+        start[above(i) + 1] += 1;
         if parent[i] != NONE {
             size[parent[i] as usize] += size[i]; // parents come after their children
         }
@@ -83,8 +83,8 @@ fn postorder(parent: &[u32]) -> Vec<u32> {
     (0..=n).for_each(|i| start[i + 1] += start[i]);
     let (mut children, mut next) = (vec![0u32; n], start.clone());
     for i in 0..n {
-        children[next[root(i)]] = i as u32;
-        next[root(i)] += 1;
+        children[next[above(i)]] = i as u32;
+        next[above(i)] += 1;
     }
     // A subtree ends at its root, and its children's end before that, one before the other.
     let (mut order, mut end) = (vec![0; n], vec![n; n + 1]);
