@@ -13,8 +13,8 @@ use faer::sparse::linalg::cholesky::{self, SymbolicCholeskyRaw, supernodal::Symb
 
 use crate::eigen::block::{Block, WIDTH};
 use crate::eigen::front::{Tree, Workspace};
+use crate::eigen::gram::smaller;
 use crate::eigen::kernel::Kind;
-use crate::eigen::order::starts;
 use crate::eigen::seconds::Step;
 use crate::eigen::solve::{Layout, Packed, Supernode, triangle_lines};
 use crate::eigen::{EigenError, Progress};
@@ -65,7 +65,7 @@ impl Pivots {
     pub(crate) fn and(self, other: Pivots) -> Pivots {
         Pivots {
             negative: self.negative + other.negative,
-            least: if self.least.is_nan() || other.least.is_nan() { f64::NAN } else { self.least.min(other.least) },
+            least: smaller(self.least, other.least),
             growth: self.growth.max(other.growth),
         }
     }
@@ -76,13 +76,14 @@ impl Symbolic {
     /// [`EigenError::OutOfMemory`] if the pattern of L cannot be held.
     pub(crate) fn new(matrix: &Csr, kind: Kind) -> Result<Symbolic, EigenError> {
         let n = matrix.rows();
-        let out_of_memory = || EigenError::OutOfMemory { dofs: n };
-        let start = starts(matrix).ok_or_else(out_of_memory)?;
-        let pattern = SymbolicSparseColMatRef::new_checked(n, n, &start, None, &matrix.columns);
+        // Not in 32-bit numbers, as for the order: these count the entries of L.
+        let columns: Vec<usize> = matrix.columns.iter().map(|&column| column as usize).collect();
+        let pattern = SymbolicSparseColMatRef::new_checked(n, n, &matrix.start, None, &columns);
         let parameters = cholesky::CholeskySymbolicParams {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
             ..Default::default()
         };
+        let out_of_memory = || EigenError::OutOfMemory { dofs: n };
         let cholesky = cholesky::factorize_symbolic_cholesky(
             pattern,
             Side::Upper,
@@ -142,13 +143,13 @@ fn lock<T>(list: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 /// Where the entries of the supernodes go.
-fn layout(symbolic: &SymbolicSupernodalCholesky<u32>) -> Layout {
+fn layout(symbolic: &SymbolicSupernodalCholesky<usize>) -> Layout {
     let n = symbolic.nrows();
     let mut supernodes = Vec::with_capacity(symbolic.n_supernodes());
     let (mut len, mut rows) = (0, Vec::new());
     for number in 0..symbolic.n_supernodes() {
-        let begin = symbolic.supernode_begin()[number] as usize;
-        let width = symbolic.supernode_end()[number] as usize - begin;
+        let begin = symbolic.supernode_begin()[number];
+        let width = symbolic.supernode_end()[number] - begin;
         let pattern = symbolic.supernode(number).pattern();
         let groups = pattern.len().div_ceil(WIDTH);
         let mut supernode = Supernode { begin, width, diagonal: len, below: len, rows: rows.len(), groups };
@@ -156,7 +157,7 @@ fn layout(symbolic: &SymbolicSupernodalCholesky<u32>) -> Layout {
         supernode.below = supernode.diagonal_start(last) + WIDTH * last + triangle_lines(width - WIDTH * last);
         len = supernode.below + groups * width;
         supernodes.push(supernode);
-        rows.extend(pattern);
+        rows.extend(pattern.iter().map(|&row| row as u32));
         rows.resize(supernodes[number].rows + WIDTH * groups, n as u32);
     }
     Layout { supernodes, rows, len: len + WIDTH }

@@ -254,14 +254,14 @@ impl Tree {
         let row = |number: usize| layout.supernodes.get(number).map_or(self.columns(), |s| s.begin);
         let (lines, rows) = ([line(middle), line(end)], [row(middle), row(end)]);
         let (both, columns) = packed.values.split_at_mut(lines[1]);
-        let [first_columns, second_columns] = <[_; 2]>::from(both.split_at_mut(lines[0]));
+        let (first_columns, second_columns) = both.split_at_mut(lines[0]);
         let (both, inverse) = packed.inverse.split_at_mut(rows[1]);
-        let [first_inverse, second_inverse] = <[_; 2]>::from(both.split_at_mut(rows[0]));
+        let (first_inverse, second_inverse) = both.split_at_mut(rows[0]);
         let mut pivots = [Pivots::default(); 3];
         let [first, second, rest] = &mut pivots;
         if end > 0 {
-            let [(even, even_after), (odd, odd_after)] =
-                [even.split_at_mut(self.stack_from[0]), odd.split_at_mut(self.stack_from[1])];
+            let (even, even_after) = even.split_at_mut(self.stack_from[0]);
+            let (odd, odd_after) = odd.split_at_mut(self.stack_from[1]);
             let before = Share {
                 supernodes: 0..middle,
                 columns: first_columns,

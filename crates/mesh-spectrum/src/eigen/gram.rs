@@ -19,6 +19,12 @@ pub(crate) fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || a > b { a } else { b }
 }
 
+/// The smaller of two numbers; not a number, if one is not.
+#[inline(always)]
+pub(crate) fn smaller(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a < b { a } else { b }
+}
+
 /// For each of `columns`, Q_kᵀ W_i of the blocks i in the range that `of` says, and of all blocks k before the end it
 /// says. Summed in parts that do not depend on the number of threads.
 fn products(

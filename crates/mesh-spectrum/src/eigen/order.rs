@@ -24,7 +24,7 @@ pub(crate) fn elimination_order(matrix: &Csr) -> Result<Vec<u32>, EigenError> {
 }
 
 /// Where rows start, in the numbers that columns have; `None` if there are too many entries.
-pub(crate) fn starts(matrix: &Csr) -> Option<Vec<u32>> {
+fn starts(matrix: &Csr) -> Option<Vec<u32>> {
     matrix.start.iter().map(|&start| start.try_into().ok()).collect()
 }
 
@@ -72,13 +72,12 @@ fn elimination_tree(matrix: &Csr, order: &[u32], position: &[u32]) -> Vec<u32> {
 /// Children before parents, the largest subtree last, next to its parent.
 fn postorder(parent: &[u32]) -> Vec<u32> {
     let n = parent.len();
+    // All trees hang from one more vertex, number n.
     let above = |i: usize| if parent[i] == NONE { n } else { parent[i] as usize };
-    let (mut size, mut start) = (vec![1u32; n], vec![0; n + 2]);
+    let (mut size, mut start) = (vec![1u32; n + 1], vec![0; n + 2]);
     for i in 0..n {
         start[above(i) + 1] += 1;
-        if parent[i] != NONE {
-            size[parent[i] as usize] += size[i]; // parents come after their children
-        }
+        size[above(i)] += size[i]; // parents come after their children
     }
     (0..=n).for_each(|i| start[i + 1] += start[i]);
     let (mut children, mut next) = (vec![0u32; n], start.clone());
@@ -87,20 +86,17 @@ fn postorder(parent: &[u32]) -> Vec<u32> {
         next[above(i)] += 1;
     }
     // A subtree ends at its root, and its children's end before that, one before the other.
-    let (mut order, mut end) = (vec![0; n], vec![n; n + 1]);
+    let (mut order, mut end) = (vec![0; n + 1], vec![n + 1; n + 1]);
     for i in (0..=n).rev() {
-        if i < n {
-            end[i] -= 1;
-            order[end[i]] = i as u32;
-        }
-        let (mut at, below) = (end[i], &mut children[start[i]..start[i + 1]]);
-        if i < n {
-            below.sort_by_key(|&child| std::cmp::Reverse(size[child as usize]));
-        }
+        let mut at = end[i] - 1;
+        order[at] = i as u32;
+        let below = &mut children[start[i]..start[i + 1]];
+        below.sort_by_key(|&child| std::cmp::Reverse(size[child as usize]));
         for &child in &*below {
             end[child as usize] = at;
             at -= size[child as usize] as usize;
         }
     }
+    order.pop();
     order
 }

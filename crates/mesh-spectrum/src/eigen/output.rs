@@ -73,7 +73,7 @@ fn in_place(vectors: Block, places: &[usize], scales: &[f64], vertices: &[Place]
     while let Some(&place) = places.get(done) {
         let first = place / WIDTH;
         let end = done + places[done..].iter().take_while(|&&place| place / WIDTH < first + TOGETHER).count();
-        // Rows end at end · n at most, 8 (first + TOGETHER) n.
+        // Pairs come no later than their places, so that rows end at 8 (first + TOGETHER) n at most: where block `first` is.
         let (rows, blocks) = memory.split_at_mut(offset + WIDTH * first * n);
         let blocks: Vec<&[Row]> = blocks.as_chunks().0.chunks(n).take(TOGETHER).collect();
         let rows = rows[done * n..end * n].chunks_exact_mut(n).collect();

@@ -28,7 +28,7 @@ pub(crate) struct Layout {
     pub(crate) supernodes: Vec<Supernode>,
     /// Row numbers in groups of eight; the last group of a supernode is filled up with n, a row of its own in x.
     pub(crate) rows: Vec<u32>,
-    /// Rows of 64 bytes, and some at the end that are only read along with others.
+    /// Rows of 64 bytes, and eight at the end that the second sweep may read along with the last columns.
     pub(crate) len: usize,
 }
 
@@ -214,7 +214,8 @@ fn backward<A: Arithmetic, const HIGH: usize>(factor: &Packed, s: &Supernode, x:
     }
 }
 
-/// Lᵀ x over all rows below a group of columns: `COLUMNS` of them, from number `high` of the group.
+/// Lᵀ x over all rows below a group of columns: `COLUMNS` of them, from number `high` of the group. Where the supernode
+/// has fewer, what follows them is read in their place, and nobody uses those sums.
 #[inline(always)]
 fn above<A: Arithmetic, const COLUMNS: usize>(
     factor: &Packed,

@@ -5,6 +5,7 @@ use std::ops::Range;
 use crate::eigen::arithmetic::Arithmetic;
 use crate::eigen::block::{Row, WIDTH, ZERO};
 use crate::eigen::factor::Pivots;
+use crate::eigen::gram::smaller;
 use crate::eigen::products::{add_outer, in_groups};
 use crate::eigen::solve::{Supernode, for_length, in_triangle, triangle_lines};
 
@@ -148,7 +149,7 @@ fn eliminate_block<A: Arithmetic, const C: usize, const P: usize>(
         let owed = tile[j];
         let pivot = owed[j];
         pivots.negative += usize::from(pivot < 0.0);
-        pivots.least = if pivot.is_nan() { f64::NAN } else { pivots.least.min(pivot.abs()) };
+        pivots.least = smaller(pivots.least, pivot.abs());
         let one_by = 1.0 / pivot;
         block.inverses[j] = one_by;
         inverse[column + j] = one_by;
